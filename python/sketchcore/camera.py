@@ -1,0 +1,151 @@
+"""Cameras and the 13 named viewpoints that drawings are made from (paper, section 4.3)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FOV_DEGREES = 45.0
+NEAR = 1.25
+FAR = 2.75
+DISTANCE = 2.0
+
+
+def _frozen_array(value: ArrayLike, shape: tuple[int, ...], name: str) -> NDArray[np.float64]:
+    array = np.array(value, dtype=np.float64)
+    if array.shape != shape:
+        raise ValueError(f"camera {name} must have shape {list(shape)}, got {list(array.shape)}")
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A pinhole camera with a square image; axes x right, y down, z forward (OpenCV).
+
+    Attributes:
+        position: float64 [3], the eye in world units.
+        rotation: float64 [3, 3], rows are the camera's x, y and z axes in the world.
+        fov_degrees: vertical (and horizontal) field of view in degrees.
+        near: distance along z of the first plane of the camera grid, world units.
+        far: distance along z of the last plane of the camera grid, world units.
+
+    Raises:
+        ValueError: if a shape is wrong, a number is not finite, the rotation is no rotation, the field of
+            view lies outside (0, 180) or not 0 < near < far.
+    """
+
+    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    fov_degrees: float = FOV_DEGREES
+    near: float = NEAR
+    far: float = FAR
+    _packed: NDArray[np.float64] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        position = _frozen_array(self.position, (3,), "position")
+        rotation = _frozen_array(self.rotation, (3, 3), "rotation")
+        numbers = np.concatenate([position, rotation.ravel(), [self.fov_degrees, self.near, self.far]])
+        if not np.isfinite(numbers).all():
+            raise ValueError("camera has a NaN or infinite number; every entry must be finite")
+        # Cameras stored with six decimals are still rotations: hence the tolerance.
+        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-4 or np.linalg.det(rotation) < 0:
+            raise ValueError(
+                "camera rotation must be orthonormal with determinant +1 (rows: right, down, forward)"
+            )
+        if not 0 < self.fov_degrees < 180:
+            raise ValueError(f"camera fov_degrees must lie between 0 and 180, got {self.fov_degrees}")
+        if not 0 < self.near < self.far:
+            raise ValueError(f"camera needs 0 < near < far, got near {self.near} and far {self.far}")
+        numbers.setflags(write=False)
+        object.__setattr__(self, "position", position)
+        object.__setattr__(self, "rotation", rotation)
+        object.__setattr__(self, "_packed", numbers)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Camera) and bool(np.array_equal(self._packed, other._packed))
+
+    def __hash__(self) -> int:
+        return hash(self._packed.tobytes())
+
+    @property
+    def packed(self) -> NDArray[np.float64]:
+        """float64 [15], the form the Rust core takes: position, rotation row by row, fov, near, far."""
+        return self._packed
+
+    @classmethod
+    def from_packed(cls, packed: ArrayLike) -> Camera:
+        """The camera of a packed row, float64 [15] (see `packed`)."""
+        row = _frozen_array(packed, (15,), "row")
+        return cls(row[:3], row[3:12].reshape(3, 3), float(row[12]), float(row[13]), float(row[14]))
+
+    @classmethod
+    def orbit(cls, azimuth: float, elevation: float, distance: float = DISTANCE) -> Camera:
+        """A camera that looks at the origin from a distance.
+
+        Args:
+            azimuth: degrees from +x towards +z.
+            elevation: degrees above the horizon; at 90 the image's right is +x and its top -z.
+            distance: world units from the origin, more than 0.
+        """
+        if distance <= 0:
+            raise ValueError(f"camera distance must be more than 0, got {distance}")
+        if elevation == 90.0:
+            return cls(np.array([0.0, distance, 0.0]), np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]))
+        a, e = math.radians(azimuth), math.radians(elevation)
+        position = np.array([math.cos(e) * math.cos(a), math.sin(e), math.cos(e) * math.sin(a)])
+        forward = -position
+        right = np.array([math.sin(a), 0.0, -math.cos(a)])
+        down = np.cross(forward, right)
+        return cls(distance * position, np.stack([right, down, forward]))
+
+
+def pack_cameras(cameras: Iterable[Camera]) -> NDArray[np.float64]:
+    """float64 [n, 15], the form the Rust core takes.
+
+    Raises:
+        TypeError: if an entry is not a `Camera`.
+    """
+    rows = []
+    for camera in cameras:
+        if not isinstance(camera, Camera):
+            raise TypeError(f"expected a sketchcore.Camera, got {type(camera).__name__}")
+        rows.append(camera.packed)
+    return np.stack(rows) if rows else np.empty((0, 15))
+
+
+def _viewpoints() -> Mapping[str, Camera]:
+    quarters = (37.5, 52.5, 127.5, 142.5, 217.5, 232.5, 307.5, 322.5)
+    named = {f"quarter-{int(azimuth):03d}": Camera.orbit(azimuth, 38.0) for azimuth in quarters}
+    for name, azimuth in (("front", 0.0), ("right", 90.0), ("back", 180.0), ("left", 270.0)):
+        named[name] = Camera.orbit(azimuth, 0.0)
+    named["top"] = Camera.orbit(0.0, 90.0)
+    return MappingProxyType(named)
+
+
+VIEWPOINTS: Mapping[str, Camera] = _viewpoints()
+"""Name -> camera: eight three-quarter views (the single view's), then front, right, back, left and top."""
+
+QUARTER_VIEWS: tuple[str, ...] = tuple(name for name in VIEWPOINTS if name.startswith("quarter-"))
+"""Names of the eight three-quarter viewpoints that a first drawing is made from."""
+
+
+def as_camera(view: str | Camera) -> Camera:
+    """The camera of a viewpoint's name; a camera stays as it is.
+
+    Raises:
+        KeyError: for a name that is no viewpoint (the message lists them).
+        TypeError: for anything else.
+    """
+    if isinstance(view, Camera):
+        return view
+    if isinstance(view, str):
+        if view not in VIEWPOINTS:
+            raise KeyError(f"unknown viewpoint {view!r}; the viewpoints are {', '.join(VIEWPOINTS)}")
+        return VIEWPOINTS[view]
+    raise TypeError(f"a view is a viewpoint's name or a sketchcore.Camera, got {type(view).__name__}")

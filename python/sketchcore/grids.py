@@ -1,0 +1,186 @@
+"""World grid, camera grid, and what drawings say about them: the kernels, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sketchcore import _core
+from sketchcore.camera import Camera, pack_cameras
+from sketchcore.shape import Shape
+
+SIDE = 64
+IMAGE = 256
+
+
+def _as_shape(shape: object) -> Shape:
+    if isinstance(shape, Shape):
+        return shape
+    raise TypeError(f"expected a sketchcore.Shape, got {type(shape).__name__}; meshes are not supported yet")
+
+
+def _as_camera(camera: object) -> Camera:
+    if isinstance(camera, Camera):
+        return camera
+    raise TypeError(f"expected a sketchcore.Camera, got {type(camera).__name__}")
+
+
+def voxelize(shape: Shape) -> NDArray[np.uint8]:
+    """The world grid of a shape as it stands: uint8 [64, 64, 64] (x, y, z), 1 where a voxel's centre is inside.
+
+    Raises:
+        TypeError: for anything but a `Shape`.
+    """
+    return _core.voxelize(_as_shape(shape).packed)
+
+
+def frustum(shape: Shape, camera: Camera, rays: int = 4) -> NDArray[np.uint8]:
+    """The camera grid of a shape: uint8 [64, 64, 64] (depth, row, col), the share of a cell inside, 255 = all.
+
+    Exact along depth, sampled by `rays` x `rays` (1 to 16) rays a cell across the image.
+
+    Raises:
+        ValueError: if the camera stands inside the shape.
+        TypeError: for anything but a `Shape` and a `Camera`.
+    """
+    return _core.frustum(_as_shape(shape).packed, _as_camera(camera).packed, rays)
+
+
+def buffers(
+    shape: Shape, camera: Camera, size: int = IMAGE
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Depth and normals of a shape, by one ray a pixel.
+
+    Returns:
+        depth: float32 [size, size], world units along the camera's z axis; infinite where nothing is seen.
+        normal: float32 [size, size, 3], unit normals in the world, towards the eye; 0 where nothing is seen.
+
+    Raises:
+        ValueError: if the camera stands inside the shape, or size is not between 1 and 4096.
+        TypeError: for anything but a `Shape` and a `Camera`.
+    """
+    return _core.buffers(_as_shape(shape).packed, _as_camera(camera).packed, size)
+
+
+def draw(shape: Shape, camera: Camera) -> NDArray[np.uint8]:
+    """The line drawing of a shape, uint8 [256, 256], ink 255 on 0 (Saito and Takahashi; paper, section 4.2).
+
+    Raises:
+        ValueError: if the camera stands inside the shape.
+        TypeError: for anything but a `Shape` and a `Camera`.
+    """
+    return _core.draw(_as_shape(shape).packed, _as_camera(camera).packed)
+
+
+def _as_volumes(volume: NDArray[np.floating], name: str) -> NDArray[np.float32]:
+    array = np.asarray(volume)
+    if array.dtype.kind not in "fiub":
+        raise TypeError(f"{name} must hold numbers, got dtype {array.dtype}")
+    if array.ndim not in (3, 4) or array.shape[-3:] != (SIDE,) * 3:
+        raise ValueError(f"{name} must have shape [64, 64, 64] or [n, 64, 64, 64], got {list(array.shape)}")
+    return np.ascontiguousarray(array, np.float32).reshape(-1, SIDE, SIDE, SIDE)
+
+
+def _as_cameras(camera: Camera | Sequence[Camera], batch: bool) -> NDArray[np.float64]:
+    if batch == isinstance(camera, Camera):
+        raise TypeError(
+            "a volume goes with one camera, a batch of volumes with a sequence of as many cameras"
+        )
+    return pack_cameras([camera] if isinstance(camera, Camera) else camera)
+
+
+def to_camera_grid(volume: NDArray[np.floating], camera: Camera | Sequence[Camera]) -> NDArray[np.float32]:
+    """Resamples world volumes into camera grids, trilinear, 0 outside the world grid.
+
+    Args:
+        volume: [64, 64, 64] (x, y, z), or a batch [n, 64, 64, 64].
+        camera: one camera, or n of them for a batch.
+
+    Returns:
+        float32 of the same shape (depth, row, col).
+
+    Raises:
+        ValueError: for a wrong shape, a number of cameras that differs from that of volumes, NaN or infinity.
+        TypeError: for what is no volume or no camera.
+    """
+    batch = np.ndim(volume) == 4
+    grids = _core.to_camera_grid(_as_volumes(volume, "volume"), _as_cameras(camera, batch))
+    return grids if batch else grids[0]
+
+
+def to_world_grid(
+    volume: NDArray[np.floating],
+    camera: Camera | Sequence[Camera],
+    into: NDArray[np.floating] | None = None,
+) -> NDArray[np.float32]:
+    """Resamples camera grids into world volumes, trilinear; voxels outside the frustum keep `into`, or 0.
+
+    Args:
+        volume: [64, 64, 64] (depth, row, col), or a batch [n, 64, 64, 64].
+        camera: one camera, or n of them for a batch.
+        into: what holds outside the frustum, the shape of `volume` (x, y, z); it is left as it is.
+
+    Returns:
+        float32 of the same shape (x, y, z).
+
+    Raises:
+        ValueError: for a wrong shape, a number of cameras that differs from that of volumes, NaN or infinity.
+        TypeError: for what is no volume or no camera.
+    """
+    batch = np.ndim(volume) == 4
+    volumes = _as_volumes(volume, "volume")
+    if into is not None and np.shape(into) != np.shape(volume):
+        raise ValueError(
+            f"into must have the volume's shape {list(np.shape(volume))}, got {list(np.shape(into))}"
+        )
+    result = np.zeros_like(volumes) if into is None else _as_volumes(into, "into").copy()
+    _core.to_world_grid(volumes, _as_cameras(camera, batch), result)
+    return result if batch else result[0]
+
+
+def as_drawings(drawings: NDArray[np.uint8] | Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    """Drawings as uint8 [n, 256, 256], contiguous; ink 255 on 0.
+
+    Raises:
+        ValueError: for another shape.
+        TypeError: for another dtype.
+    """
+    array = np.asarray(drawings)
+    if array.dtype != np.uint8:
+        raise TypeError(f"drawings must be uint8 (ink 255 on 0), got {array.dtype}")
+    if array.ndim == 2:
+        array = array[None]
+    if array.ndim != 3 or array.shape[1:] != (IMAGE, IMAGE):
+        raise ValueError(f"drawings must have shape [n, 256, 256], got {list(array.shape)}")
+    return np.ascontiguousarray(array)
+
+
+def silhouette(drawing: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The inside of a drawing's outline: uint8 [256, 256], 1 inside, lines and holes included.
+
+    Gaps of up to 10 pixels in the outline are closed.
+    """
+    return _core.silhouettes(as_drawings(drawing))[0]
+
+
+def carve(
+    drawings: NDArray[np.uint8] | Sequence[NDArray[np.uint8]], cameras: Sequence[Camera]
+) -> NDArray[np.uint8]:
+    """Silhouette carving: uint8 [64, 64, 64] (x, y, z), 1 where a voxel's centre falls into every silhouette.
+
+    Args:
+        drawings: uint8 [n, 256, 256], ink 255 on 0.
+        cameras: one a drawing.
+
+    Raises:
+        ValueError: for no drawings, a wrong shape, or a number of cameras that differs from that of drawings.
+        TypeError: for a wrong dtype or what is no camera.
+    """
+    images = as_drawings(drawings)
+    if len(images) == 0:
+        raise ValueError("carving needs at least one drawing")
+    if len(images) != len(cameras):
+        raise ValueError(f"each drawing needs a camera: got {len(images)} drawings, {len(cameras)} cameras")
+    return _core.carve(images, pack_cameras(cameras))

@@ -1,0 +1,35 @@
+"""Which device to compute on, and in which precision."""
+
+from __future__ import annotations
+
+import torch
+
+
+def pick_device(device: str | torch.device | None = None) -> torch.device:
+    """The device asked for; CUDA where there is one, else the CPU, when none is.
+
+    Raises:
+        ValueError: for a CUDA device on a machine that has none, or a name that torch does not know.
+    """
+    if device is None:
+        return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    try:
+        chosen = torch.device(device)
+    except RuntimeError as error:
+        raise ValueError(f"unknown device {device!r}; 'cpu' and 'cuda' are known") from error
+    if chosen.type == "cuda" and not torch.cuda.is_available():
+        raise ValueError("no CUDA device is available here; leave device out to use the CPU")
+    return chosen
+
+
+def has_fast_bfloat16(device: torch.device) -> bool:
+    """Whether bfloat16 convolutions are faster than float32 ones: CUDA, and CPUs with AVX-512 bf16 or AMX."""
+    if device.type == "cuda":
+        return bool(torch.cuda.is_bf16_supported())
+    checks = ("_is_avx512_bf16_supported", "_is_amx_tile_supported")
+    return device.type == "cpu" and any(bool(getattr(torch.cpu, c, bool)()) for c in checks)
+
+
+def autocast(device: torch.device, enabled: bool = True) -> torch.autocast:
+    """A context in which convolutions run in bfloat16 where that is faster."""
+    return torch.autocast(device.type, torch.bfloat16, enabled=enabled and has_fast_bfloat16(device))

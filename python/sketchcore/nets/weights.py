@@ -1,0 +1,126 @@
+"""Weights on disk: `NAME.safetensors` with the config that rebuilds their network beside it, `NAME.json`.
+
+Nothing is ever pickled, so opening a stranger's weights runs no code of theirs.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load, save
+from torch import Tensor
+
+SUFFIX = ".safetensors"
+
+
+def save_weights(
+    path: str | os.PathLike[str],
+    state_dict: Mapping[str, Tensor],
+    config: Mapping[str, Any],
+    dtype: torch.dtype | None = torch.float16,
+) -> None:
+    """Write weights and their config; each file appears whole or not at all.
+
+    Stored are all tensors of the state dict under their names: floating-point ones (weights, biases, running
+    statistics) rounded to `dtype`, integer buffers (`num_batches_tracked`) as they are. The config becomes
+    UTF-8 JSON in the file of the same stem that ends in .json; its tuples come back as lists. The config is
+    replaced first, then the weights.
+
+    Args:
+        path: file to write, ending in .safetensors, in a folder that exists.
+        state_dict: tensors by name, on any device, in any memory layout.
+        config: what rebuilds the network; JSON values only.
+        dtype: floating-point type to store (float16, bfloat16, ...); None keeps each tensor's own.
+
+    Raises:
+        ValueError: if the suffix is wrong, the dtype is no floating-point type, a weight is not finite or too
+            large for the dtype, or the config holds a NaN or an infinite number. Nothing is written then.
+        TypeError: if the config holds what JSON cannot. Nothing is written then.
+        FileNotFoundError: if the folder does not exist.
+    """
+    path = _checked(path)
+    if dtype is not None and not dtype.is_floating_point:
+        raise ValueError(f"weights are stored in a floating-point dtype or None, got {dtype}")
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"no folder {path.parent} to write weights into")
+    text = json.dumps(dict(config), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    stored = {
+        name: tensor.detach().to(
+            "cpu",
+            dtype if tensor.is_floating_point() else None,
+            copy=True,  # tied weights are stored twice: safetensors refuses shared memory
+            memory_format=torch.contiguous_format,
+        )
+        for name, tensor in state_dict.items()
+    }
+    _refuse_non_finite(stored, f"to be stored as {dtype or 'they are'}")
+    _write_whole(path.with_suffix(".json"), text.encode())
+    _write_whole(path, save(stored))
+
+
+def load_weights(path: str | os.PathLike[str]) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """Read what `save_weights` wrote.
+
+    Args:
+        path: the .safetensors file; its config is looked for beside it.
+
+    Returns:
+        The state dict on the CPU, floating-point tensors as float32 and integer ones as stored; the config.
+
+    Raises:
+        FileNotFoundError: if the weights or their config are missing.
+        ValueError: if the suffix is wrong, either file is truncated, corrupt or of another kind, or a weight
+            is not finite.
+    """
+    path = _checked(path)
+    config_path = path.with_suffix(".json")
+    if not path.is_file():
+        raise FileNotFoundError(f"no weights at {path}")
+    if not config_path.is_file():
+        raise FileNotFoundError(f"weights {path} need their config beside them; {config_path} is missing")
+    try:
+        config = json.loads(config_path.read_bytes())
+    except ValueError as error:
+        raise ValueError(f"config {config_path} is not valid JSON: {error}") from error
+    if not isinstance(config, dict):
+        raise ValueError(f"config {config_path} must be a JSON object, got {type(config).__name__}")
+    try:
+        stored: dict[str, Tensor] = load(path.read_bytes())
+    except SafetensorError as error:
+        raise ValueError(f"weights {path} are truncated, corrupt or no safetensors file: {error}") from error
+    _refuse_non_finite(stored, f"in {path}")
+    return {name: t.float() if t.is_floating_point() else t for name, t in stored.items()}, config
+
+
+def _checked(path: str | os.PathLike[str]) -> Path:
+    path = Path(path)
+    if path.suffix != SUFFIX:
+        raise ValueError(f"weights are stored as {SUFFIX}, got {path.name!r}")
+    return path
+
+
+def _refuse_non_finite(tensors: Mapping[str, Tensor], where: str) -> None:
+    bad = sorted(name for name, t in tensors.items() if t.is_floating_point() and not t.isfinite().all())
+    if bad:
+        more = f" and {len(bad) - 3} more" if len(bad) > 3 else ""
+        raise ValueError(f"weights {where} have NaN or infinite entries: {', '.join(bad[:3])}{more}")
+
+
+def _write_whole(path: Path, data: bytes) -> None:
+    """Write a file so that a reader, or a crash, sees the old file or the new one and nothing between."""
+    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    try:
+        with part.open("xb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)

@@ -1,0 +1,37 @@
+//! What can be wrong with an input, each with a sentence that says what would be right.
+
+use thiserror::Error;
+
+/// Errors of the kernels. All are the caller's to mend; `python.rs` raises them as `ValueError`.
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum CoreError {
+    #[error("{what} has a NaN or infinite number; every entry must be finite")]
+    NotFinite { what: &'static str },
+    #[error("{what} must have shape {expected}, got {got}")]
+    WrongShape { what: &'static str, expected: String, got: String },
+    #[error("a shape needs at least one primitive")]
+    NoPrimitives,
+    #[error("primitive {index} has half sizes {half:?}; each must be more than 0")]
+    ZeroSize { index: usize, half: [f64; 3] },
+    #[error("primitive {index} has kind {kind}; 0 is a cuboid, 1, 2, 3 a cylinder along x, y, z")]
+    UnknownKind { index: usize, kind: f64 },
+    #[error("camera rotation must be orthonormal with determinant +1 (rows: right, down, forward)")]
+    NotARotation,
+    #[error("camera fov_degrees must lie between 0 and 180, got {0}")]
+    FieldOfView(f64),
+    #[error("camera needs 0 < near < far, got near {near} and far {far}")]
+    DepthRange { near: f64, far: f64 },
+    #[error("the camera's position {0:?} lies inside the shape; move it outside")]
+    EyeInside([f64; 3]),
+    #[error("config: {0}")]
+    Config(String),
+    #[error("views must be between 1 and 13 (there are 13 viewpoints), got {0}")]
+    Views(usize),
+    #[error(
+        "the grammar found no acceptable shape in {attempts} attempts; \
+         allow smaller shapes (min_occupancy) or other sizes"
+    )]
+    NoShape { attempts: u32 },
+    #[error("could not start {threads} threads: {reason}")]
+    Threads { threads: usize, reason: String },
+}

@@ -1,0 +1,34 @@
+//! The kernels of sketchcore, in the order in which a shape travels:
+//!
+//! ```text
+//! random -> grammar -> csg ------> voxel                      the truth, world grid
+//!                       |
+//!                     camera ----> raycast -> buffers -> lines -> pen       the drawing
+//!                                     |
+//!                                     +------> buffers::fill_frustum        the truth, camera grid
+//! batch: all of these for one sample, and samples side by side
+//!
+//! drawing -> distance -> carve, evidence                     what drawings say about space
+//! resample                                                   world grid <-> camera grid
+//! mesh                                                       the surface that leaves the package
+//! ```
+//!
+//! Only `python` knows about Python; everything else is plain Rust that `cargo test` runs.
+
+pub mod batch;
+pub mod buffers;
+pub mod camera;
+pub mod carve;
+pub mod csg;
+pub mod distance;
+pub mod error;
+pub mod evidence;
+pub mod grammar;
+pub mod lines;
+pub mod mesh;
+pub mod pen;
+mod python;
+pub mod random;
+pub mod raycast;
+pub mod resample;
+pub mod voxel;
