@@ -52,9 +52,7 @@ def embedded(blob, corner):
 
 
 # Values at 1/2, just beside it, and equal far from it are where marching cubes falls apart.
-TRICKY = st.sampled_from(
-    [0.0, 0.25, 0.5, float(np.nextafter(np.float32(0.5), np.float32(1))), 0.501, 0.75, 1.0]
-)
+TRICKY = st.sampled_from([0.0, 0.25, 0.5, float(np.nextafter(np.float32(0.5), np.float32(1))), 0.501, 0.75, 1.0])
 ANY = st.floats(0, 1, width=32)
 BLOBS = hnp.arrays(
     np.float32, hnp.array_shapes(min_dims=3, max_dims=3, min_side=1, max_side=6), elements=TRICKY | ANY

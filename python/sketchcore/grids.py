@@ -48,9 +48,7 @@ def frustum(shape: Shape, camera: Camera, rays: int = 4) -> NDArray[np.uint8]:
     return _core.frustum(_as_shape(shape).packed, _as_camera(camera).packed, rays)
 
 
-def buffers(
-    shape: Shape, camera: Camera, size: int = IMAGE
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def buffers(shape: Shape, camera: Camera, size: int = IMAGE) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Depth and normals of a shape, by one ray a pixel.
 
     Returns:
@@ -85,9 +83,7 @@ def _as_volumes(volume: NDArray[np.floating], name: str) -> NDArray[np.float32]:
 
 def _as_cameras(camera: Camera | Sequence[Camera], batch: bool) -> NDArray[np.float64]:
     if batch == isinstance(camera, Camera):
-        raise TypeError(
-            "a volume goes with one camera, a batch of volumes with a sequence of as many cameras"
-        )
+        raise TypeError("a volume goes with one camera, a batch of volumes with a sequence of as many cameras")
     return pack_cameras([camera] if isinstance(camera, Camera) else camera)
 
 
@@ -132,9 +128,7 @@ def to_world_grid(
     batch = np.ndim(volume) == 4
     volumes = _as_volumes(volume, "volume")
     if into is not None and np.shape(into) != np.shape(volume):
-        raise ValueError(
-            f"into must have the volume's shape {list(np.shape(volume))}, got {list(np.shape(into))}"
-        )
+        raise ValueError(f"into must have the volume's shape {list(np.shape(volume))}, got {list(np.shape(into))}")
     result = np.zeros_like(volumes) if into is None else _as_volumes(into, "into").copy()
     _core.to_world_grid(volumes, _as_cameras(camera, batch), result)
     return result if batch else result[0]
@@ -162,12 +156,11 @@ def silhouette(drawing: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
     Gaps of up to 10 pixels in the outline are closed.
     """
-    return _core.silhouettes(as_drawings(drawing))[0]
+    inside: NDArray[np.uint8] = _core.silhouettes(as_drawings(drawing))[0]
+    return inside
 
 
-def carve(
-    drawings: NDArray[np.uint8] | Sequence[NDArray[np.uint8]], cameras: Sequence[Camera]
-) -> NDArray[np.uint8]:
+def carve(drawings: NDArray[np.uint8] | Sequence[NDArray[np.uint8]], cameras: Sequence[Camera]) -> NDArray[np.uint8]:
     """Silhouette carving: uint8 [64, 64, 64] (x, y, z), 1 where a voxel's centre falls into every silhouette.
 
     Args:

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from skimage.measure import marching_cubes
 
 from sketchcore import _core
-from sketchcore.volume import as_probability, replacing
+from sketchcore.atomic import replacing
+from sketchcore.volume import as_probability
 
 MESH_SUFFIXES = (".glb", ".obj", ".stl", ".ply")
 """File formats that `save_mesh` writes."""

@@ -14,14 +14,22 @@ from sketchcore.nets.models import Model, Sketches
 Volume = NDArray[np.float32]
 
 
-def update_rounds(model: Model, sketches: Sketches, iterations: int) -> Iterator[Volume]:
+def update_rounds(model: Model, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
     """Predicts from the first drawing, then visits all drawings `iterations` times: 2, 3, ... n, then 1.
+
+    Args:
+        model: the network.
+        sketches: the drawings.
+        iterations: rounds, 0 or more.
+        start: float32 [64, 64, 64], a volume known before the first drawing; it counts as one prediction.
 
     Yields:
         float32 [64, 64, 64] (x, y, z), probability of occupancy in the world grid: after the first prediction
         (round 0), and after each round.
     """
     consensus = Consensus(symmetric=model.symmetric, latest_only=model.latest_only)
+    if start is not None:
+        consensus.add(-1, start)
     yield visit(model, sketches, 0, consensus)
     order = [*range(1, len(sketches.drawings)), 0]
     for _ in range(iterations):

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import zipfile
 import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from sketchcore.atomic import replacing
 
 _PROBABILITY = "probability"
 
@@ -52,31 +51,9 @@ def iou(a: ArrayLike, b: ArrayLike) -> float:
     """
     first, second = _occupied(a), _occupied(b)
     if first.shape != second.shape:
-        raise ValueError(
-            f"iou compares volumes of one shape, got {list(first.shape)} and {list(second.shape)}"
-        )
+        raise ValueError(f"iou compares volumes of one shape, got {list(first.shape)} and {list(second.shape)}")
     union = int(np.count_nonzero(first | second))
     return int(np.count_nonzero(first & second)) / union if union else 1.0
-
-
-@contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A temporary path beside `path`, with its suffix, that takes its place when the block ends well.
-
-    So nobody ever finds half a file under `path`; after an error the old file is still there.
-
-    Raises:
-        FileNotFoundError: if there is no such folder.
-    """
-    target = Path(path)
-    if not target.parent.is_dir():
-        raise FileNotFoundError(f"{target.parent} is no folder; make it before writing {target.name} there")
-    temporary = target.with_name(f".{target.stem}-{uuid4().hex}{target.suffix}")
-    try:
-        yield temporary
-        os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def save_npz(path: str | os.PathLike[str], probability: ArrayLike, **extras: ArrayLike) -> None:
@@ -156,9 +133,7 @@ def load_binvox(path: str | os.PathLike[str]) -> NDArray[np.float32]:
     header, found, body = Path(path).read_bytes().partition(b"\ndata\n")
     lines = header.decode("ascii", "replace").split("\n")
     if not found or lines[0].split() not in (["#binvox", "1"], ["#binvox", "2"]):
-        raise ValueError(
-            f"{path} must start with '#binvox 1' or '#binvox 2', and have a line 'data' after the header"
-        )
+        raise ValueError(f"{path} must start with '#binvox 1' or '#binvox 2', and have a line 'data' after the header")
     dims = next((line.split()[1:] for line in lines if line.startswith("dim ")), [])
     if len(dims) != 3 or len(set(dims)) != 1 or not dims[0].isdecimal() or not 0 < int(dims[0]) <= 1024:
         raise ValueError(f"{path} must have a line such as 'dim 64 64 64', a cube up to 1024; got {dims}")

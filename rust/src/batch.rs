@@ -252,7 +252,7 @@ mod tests {
             for (drawing, frustum) in drawings.chunks(IMAGE * IMAGE).zip(frusta.chunks(CELLS)) {
                 let border = (0..IMAGE).flat_map(|k| [k, (IMAGE - 1) * IMAGE + k, k * IMAGE]);
                 assert!(border.clone().filter(|&i| drawing[i] > 0).count() < 8);
-                assert!(frustum.iter().any(|&v| v == 255));
+                assert!(frustum.contains(&255));
             }
         }
     }

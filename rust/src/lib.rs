@@ -27,6 +27,7 @@ pub mod grammar;
 pub mod lines;
 pub mod mesh;
 pub mod pen;
+#[cfg(feature = "python")]
 mod python;
 pub mod random;
 pub mod raycast;

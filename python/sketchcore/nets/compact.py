@@ -93,9 +93,7 @@ class CompactNet(nn.Module):
         self.config = config or CompactConfig()
         c = self.config
         stem, (w32, w16, w8), code = c.stem, c.widths, 64
-        self.condition = nn.Sequential(
-            nn.Linear(CONDITIONS, code), nn.ReLU(), nn.Linear(code, code), nn.ReLU()
-        )
+        self.condition = nn.Sequential(nn.Linear(CONDITIONS, code), nn.ReLU(), nn.Linear(code, code), nn.ReLU())
         self.image = nn.Conv2d(3 * 16, stem, 3, padding=1)
         self.volumes = nn.Conv2d(3 * SLICES, stem, 1)
         self.joined = nn.Conv2d(2 * stem, stem, 3, padding=1)

@@ -13,7 +13,7 @@ from torch import Tensor, nn
 
 from sketchcore import _core
 from sketchcore.nets.compact import CompactConfig, CompactNet, compact_inputs
-from sketchcore.nets.precision import autocast, pick_device
+from sketchcore.nets.precision import autocast, pick_device, place
 from sketchcore.nets.unet import PaperNet
 
 
@@ -48,9 +48,7 @@ class Model(Protocol):
     latest_only: bool
     device: torch.device
 
-    def predict(
-        self, sketches: Sketches, view: int, prior: NDArray[np.float32] | None
-    ) -> NDArray[np.float32]:
+    def predict(self, sketches: Sketches, view: int, prior: NDArray[np.float32] | None) -> NDArray[np.float32]:
         """float32 [64, 64, 64] (depth, row, col): the probability of occupancy in drawing `view`'s camera grid.
 
         `prior` is of that grid too, or None for the first prediction.
@@ -65,13 +63,11 @@ class CompactModel:
     latest_only = False
 
     def __init__(self, net: CompactNet, device: torch.device) -> None:
-        self.net = net.to(device, memory_format=torch.channels_last).eval()
+        self.net = place(net, device).eval()
         self.device = device
 
     @torch.inference_mode()
-    def predict(
-        self, sketches: Sketches, view: int, prior: NDArray[np.float32] | None
-    ) -> NDArray[np.float32]:
+    def predict(self, sketches: Sketches, view: int, prior: NDArray[np.float32] | None) -> NDArray[np.float32]:
         evidence = _core.evidence(sketches.fields, sketches.cameras, view, self.symmetric)
         one = slice(view, view + 1)
         inputs = compact_inputs(
@@ -96,24 +92,18 @@ class PaperModel:
     latest_only = True
 
     def __init__(self, single: PaperNet, updater: PaperNet | None, device: torch.device) -> None:
-        self.single = single.to(device, memory_format=torch.channels_last).eval()
-        self.updater = (
-            None if updater is None else updater.to(device, memory_format=torch.channels_last).eval()
-        )
+        self.single = place(single, device).eval()
+        self.updater = None if updater is None else place(updater, device).eval()
         self.device = device
 
     @torch.inference_mode()
-    def predict(
-        self, sketches: Sketches, view: int, prior: NDArray[np.float32] | None
-    ) -> NDArray[np.float32]:
+    def predict(self, sketches: Sketches, view: int, prior: NDArray[np.float32] | None) -> NDArray[np.float32]:
         drawing = torch.from_numpy(sketches.drawings[view]).to(self.device).float()[None, None] / 255
         with autocast(self.device):
             if prior is None:
                 logits = self.single(drawing)
             elif self.updater is None:
-                raise ValueError(
-                    "these weights hold the single-view network alone; train the updater as well"
-                )
+                raise ValueError("these weights hold the single-view network alone; train the updater as well")
             else:
                 logits = self.updater(drawing, torch.from_numpy(prior).to(self.device)[None])
         return _array(PaperNet.probability(logits.float())[0])
@@ -136,19 +126,15 @@ def build_model(
     kind = config.get("network")
     if kind == "compact":
         options = dict(config.get("options", {}))
-        tuples = {k: tuple(v) if isinstance(v, list) else v for k, v in options.items()}
+        tuples: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in options.items()}
         net = CompactNet(CompactConfig(**tuples))
         _fill(net, state)
         return CompactModel(net, chosen)
     if kind == "paper":
         parts = {name.split(".", 1)[0] for name in state}
-        nets = {
-            part: PaperNet(updater=part == "updater", **config.get("options", {})) for part in sorted(parts)
-        }
+        nets = {part: PaperNet(updater=part == "updater", **config.get("options", {})) for part in sorted(parts)}
         if "single" not in nets or not parts <= {"single", "updater"}:
-            raise ValueError(
-                f"weights of the network 'paper' hold 'single' and 'updater', got {sorted(parts)}"
-            )
+            raise ValueError(f"weights of the network 'paper' hold 'single' and 'updater', got {sorted(parts)}")
         for part, net_ in nets.items():
             _fill(net_, {k.split(".", 1)[1]: v for k, v in state.items() if k.startswith(f"{part}.")})
         return PaperModel(nets["single"], nets.get("updater"), chosen)

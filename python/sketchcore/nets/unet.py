@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional as F  # noqa: N812 (the name that everyone knows it by)
+from torch.nn import functional as F
 
 IMAGE = 256
 GRID = 64
@@ -144,8 +144,7 @@ def paper_loss(logits: Tensor, truth: Tensor) -> Tensor:
     """
     if logits.ndim != 5 or logits.shape[1] != 2 or truth.shape != logits[:, 0].shape:
         raise ValueError(
-            "logits [B, 2, D, H, W] need truth [B, D, H, W], "
-            f"got {list(logits.shape)} and {list(truth.shape)}"
+            f"logits [B, 2, D, H, W] need truth [B, D, H, W], got {list(logits.shape)} and {list(truth.shape)}"
         )
     # A softmax over two classes is the logistic function of their difference.
     empty, occupied = logits.float().unbind(dim=1)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import secrets
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,8 @@ import torch
 from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor
+
+from sketchcore.atomic import write_atomically
 
 SUFFIX = ".safetensors"
 
@@ -48,8 +49,6 @@ def save_weights(
     path = _checked(path)
     if dtype is not None and not dtype.is_floating_point:
         raise ValueError(f"weights are stored in a floating-point dtype or None, got {dtype}")
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"no folder {path.parent} to write weights into")
     text = json.dumps(dict(config), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
     stored = {
         name: tensor.detach().to(
@@ -61,8 +60,8 @@ def save_weights(
         for name, tensor in state_dict.items()
     }
     _refuse_non_finite(stored, f"to be stored as {dtype or 'they are'}")
-    _write_whole(path.with_suffix(".json"), text.encode())
-    _write_whole(path, save(stored))
+    write_atomically(path.with_suffix(".json"), text.encode())
+    write_atomically(path, save(stored))
 
 
 def load_weights(path: str | os.PathLike[str]) -> tuple[dict[str, Tensor], dict[str, Any]]:
@@ -111,16 +110,3 @@ def _refuse_non_finite(tensors: Mapping[str, Tensor], where: str) -> None:
     if bad:
         more = f" and {len(bad) - 3} more" if len(bad) > 3 else ""
         raise ValueError(f"weights {where} have NaN or infinite entries: {', '.join(bad[:3])}{more}")
-
-
-def _write_whole(path: Path, data: bytes) -> None:
-    """Write a file so that a reader, or a crash, sees the old file or the new one and nothing between."""
-    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-    try:
-        with part.open("xb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)

@@ -23,7 +23,7 @@ from sketchcore import _core
 from sketchcore.consensus import Consensus
 from sketchcore.datagen.generate import generate
 from sketchcore.nets.compact import CompactConfig, CompactNet, compact_inputs, compact_loss
-from sketchcore.nets.precision import autocast
+from sketchcore.nets.precision import autocast, place
 from sketchcore.train.presets import Preset
 
 DRAWINGS = (0.4, 0.25, 0.2, 0.15)
@@ -106,10 +106,8 @@ class ChainStage:
         samples: how many shapes have been started.
     """
 
-    def __init__(
-        self, preset: Preset, seed: int, device: torch.device, samples: int, config: CompactConfig
-    ) -> None:
-        self.model = CompactNet(config).to(device, memory_format=torch.channels_last)
+    def __init__(self, preset: Preset, seed: int, device: torch.device, samples: int, config: CompactConfig) -> None:
+        self.model = place(CompactNet(config), device)
         self._device = device
         self.samples = 0
         self._source = ChainSource(preset, seed, first=samples)

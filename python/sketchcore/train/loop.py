@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import torch
-from rich.progress import BarColumn, Progress as Bar, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
 from torch import Tensor, nn
 
 from sketchcore.nets.compact import CompactConfig, CompactNet
@@ -28,8 +29,12 @@ from sketchcore.train.presets import PRESETS, Preset
 class Stage(Protocol):
     """One network's training: makes its own samples."""
 
-    model: nn.Module
     samples: int
+
+    @property
+    def model(self) -> nn.Module:
+        """The network that is trained."""
+        ...
 
     def step(self) -> Tensor:
         """The loss of the next batch."""
@@ -127,9 +132,7 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
     return results
 
 
-def _stage(
-    run: Run, name: str, device: torch.device, found: Checkpoint | None, trained: dict[str, nn.Module]
-) -> Stage:
+def _stage(run: Run, name: str, device: torch.device, found: Checkpoint | None, trained: dict[str, nn.Module]) -> Stage:
     torch.manual_seed(run.seed)
     samples = found.progress.samples if found else 0
     width = (run.options or {}).get("width", 64)
@@ -185,7 +188,7 @@ class _Loop:
             assert self.run.steps is not None
             return self.progress.step / self.run.steps
 
-        with _bar(before.stage, quiet) as show:
+        with _TrainingBar(before.stage, quiet) as show:
             while (part := done()) < 1:
                 loss = self._step(part, self.progress.step - before.step)
                 now = time.monotonic()
@@ -250,9 +253,7 @@ class _Loop:
 
     def _save(self) -> None:
         average = self.average.state_dict() if self.constants.average else {}
-        save_checkpoint(
-            self.path, self.stage.model.state_dict(), average, self.optimizer.state_dict(), self.progress
-        )
+        save_checkpoint(self.path, self.stage.model.state_dict(), average, self.optimizer.state_dict(), self.progress)
 
 
 def _save_weights(run: Run, trained: dict[str, nn.Module], results: list[Progress]) -> None:
@@ -264,16 +265,16 @@ def _save_weights(run: Run, trained: dict[str, nn.Module], results: list[Progres
         net = trained["compact"]
         assert isinstance(net, CompactNet)
         options = net.describe()
+    constants = {**asdict(run.constants), "generator": dict(run.constants.generator)}
     config = {
         "network": run.preset,
         "options": options,
-        "training": {"seed": run.seed, **asdict(run.constants), "stages": [asdict(p) for p in results]},
+        "training": {"seed": run.seed, **constants, "runs": [asdict(p) for p in results]},
     }
-    config["training"]["generator"] = dict(run.constants.generator)
     save_weights(run.out / "weights.safetensors", state, config)
 
 
-class _bar:
+class _TrainingBar:
     """A progress bar with samples/s and held-out IoU; nothing when quiet."""
 
     def __init__(self, title: str, quiet: bool) -> None:
@@ -297,7 +298,5 @@ class _bar:
     def _show(self, part: float, loss: float, rate: float, progress: Progress) -> None:
         self._smooth = loss if self._smooth is None else 0.98 * self._smooth + 0.02 * loss
         iou = "..." if progress.iou is None else f"{progress.iou:.3f}"
-        note = (
-            f"loss {self._smooth:.4f}  {rate:.1f} samples/s  held-out IoU {iou}  {progress.samples:,} samples"
-        )
+        note = f"loss {self._smooth:.4f}  {rate:.1f} samples/s  held-out IoU {iou}  {progress.samples:,} samples"
         self._bar.update(self._task, completed=part, note=note)

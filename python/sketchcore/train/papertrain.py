@@ -13,7 +13,7 @@ from torch import Tensor
 from sketchcore import _core
 from sketchcore.datagen.generate import Batch, generate
 from sketchcore.nets.models import PaperModel, Sketches
-from sketchcore.nets.precision import autocast
+from sketchcore.nets.precision import autocast, place
 from sketchcore.nets.unet import PaperNet, paper_loss
 from sketchcore.train.presets import Preset
 
@@ -52,7 +52,7 @@ class SingleStage:
     """
 
     def __init__(self, preset: Preset, seed: int, device: torch.device, samples: int, width: int) -> None:
-        self.model = PaperNet(width=width).to(device, memory_format=torch.channels_last)
+        self.model = place(PaperNet(width=width), device)
         self.samples = 0
         self._device = device
         self._source = _Batches(preset, seed, samples, views=1)
@@ -83,7 +83,7 @@ class UpdaterStage:
     def __init__(
         self, preset: Preset, seed: int, device: torch.device, samples: int, width: int, single: PaperNet
     ) -> None:
-        self.model = PaperNet(updater=True, width=width).to(device, memory_format=torch.channels_last)
+        self.model = place(PaperNet(updater=True, width=width), device)
         self.samples = 0
         self._single = PaperModel(single, None, device)
         self._device = device

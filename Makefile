@@ -1,0 +1,58 @@
+# `make` formats, builds, lints and tests. Every target sets up what it needs: a virtual environment in .venv, with
+# the extension built in release mode.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+BUILT := $(VENV)/.built
+CARGO_TARGET_DIR ?= target
+export CARGO_TARGET_DIR
+
+.PHONY: all format build lint test test-rust test-python demo bench clean
+
+all: format build lint test
+
+# Dependencies, and the tools of development.
+$(READY): pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --upgrade pip
+	$(BIN)/pip install --quiet --group dev
+	touch $@
+
+# The package, editable: only a change of the Rust side or of the dependencies builds it again.
+$(BUILT): $(READY) Cargo.toml Cargo.lock $(wildcard rust/src/*.rs)
+	$(BIN)/maturin develop --release --quiet
+	touch $@
+
+build: $(BUILT)
+
+format: $(READY)
+	cargo fmt
+	$(BIN)/ruff format --quiet
+	$(BIN)/ruff check --quiet --fix --select I
+
+lint: $(BUILT)
+	cargo fmt --check
+	cargo clippy --quiet --all-targets --all-features -- -D warnings
+	$(BIN)/ruff format --check --quiet
+	$(BIN)/ruff check --quiet
+	$(BIN)/mypy
+	$(BIN)/stubtest sketchcore._core --mypy-config-file pyproject.toml --ignore-disjoint-bases
+
+test: test-rust test-python
+
+test-rust:
+	cargo test --quiet
+
+test-python: $(BUILT)
+	$(BIN)/pytest --quiet
+
+demo: $(BUILT)
+	$(BIN)/python examples/demo.py
+
+bench: $(BUILT)
+	$(BIN)/pytest --quiet benches
+
+clean:
+	rm -rf $(VENV) target out

@@ -1,0 +1,159 @@
+"""The command line: thin callers of the package's functions."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+import sketchcore as sk
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    help="Line drawings in, solid 3D shapes out; and the data to learn it from.",
+)
+_console = Console()
+
+Json = Annotated[bool, typer.Option("--json", help="Print plain JSON instead of a table.")]
+Model = Annotated[Path | None, typer.Option("--model", help="Weights to use instead of those in the package.")]
+
+
+@contextmanager
+def _errors() -> Iterator[None]:
+    """What went wrong in one sentence, and exit code 1, for what the user can mend."""
+    try:
+        yield
+    except (ValueError, TypeError, OSError, KeyError, RuntimeError) as error:
+        message = error.args[0] if isinstance(error, KeyError) else error
+        typer.echo(f"error: {message}", err=True)
+        raise typer.Exit(1) from None
+
+
+@contextmanager
+def _bar(title: str, total: int, quiet: bool = False) -> Iterator[Any]:
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), disable=quiet) as bar:
+        task = bar.add_task(title, total=total)
+        yield lambda done: bar.update(task, completed=done)
+
+
+@app.command()
+def reconstruct(
+    drawings: Annotated[list[Path], typer.Argument(help="One or more drawings of one object (PNG, JPEG, ...).")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="What to write: .glb .obj .stl .ply .npz .binvox")],
+    view: Annotated[
+        list[str] | None,
+        typer.Option("--view", help="Viewpoint of each drawing, in order; a single one's may be left out."),
+    ] = None,
+    iterations: Annotated[int, typer.Option(help="Rounds over all drawings.")] = 5,
+    picture: Annotated[Path | None, typer.Option(help="Also write a PNG of drawings and solid side by side.")] = None,
+    model: Model = None,
+    as_json: Json = False,
+) -> None:
+    """Turn drawings of one object into a solid.
+
+    The viewpoints are quarter-037 -052 -127 -142 -217 -232 -307 -322 (three-quarter views by azimuth, the front
+    of an object looks along azimuth 0), front, right, back, left and top.
+    """
+    with _errors():
+        from sketchcore.picture import save_picture
+
+        with _bar("rounds", iterations, quiet=as_json) as show:
+            solid = sk.reconstruct(
+                drawings,
+                view or None,
+                iterations=iterations,
+                model=model,
+                progress=lambda number, total, volume: show(number),
+            )
+        solid.save(out)
+        if picture is not None:
+            save_picture(solid, picture)
+    if as_json:
+        occupied = float((solid.probability > 0.5).mean())
+        report = {"out": str(out), "guessed": solid.guessed, "trace": solid.trace, "occupied": occupied}
+        typer.echo(json.dumps(report))
+    else:
+        if solid.guessed:
+            typer.echo(f"viewpoint: {solid.guessed} (guessed)")
+        typer.echo(f"wrote {out}")
+
+
+@app.command()
+def generate(
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write into.")],
+    count: Annotated[int, typer.Option(help="How many samples.")] = 100,
+    seed: Annotated[int, typer.Option(help="Which data set.")] = 0,
+    first: Annotated[int, typer.Option(help="Index of the first sample.")] = 0,
+    views: Annotated[int, typer.Option(help="Drawings a sample, 1 to 13.")] = 1,
+    config: Annotated[Path | None, typer.Option(help="JSON file of what differs from the default config.")] = None,
+) -> None:
+    """Write synthetic samples as files: INDEX.npz (drawings, world, frusta, cameras, shape) and INDEX-VIEW.png.
+
+    Training needs no files: see `sketchcore train` and `sketchcore.datasets.Generated`.
+    """
+    with _errors():
+        from sketchcore.datagen.files import write_samples
+
+        settings = json.loads(config.read_text()) if config else None
+        with _bar("samples", count) as show:
+            write_samples(out, seed, count, first=first, views=views, config=settings, progress=show)
+
+
+@app.command()
+def train(
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for weights and checkpoints.")],
+    preset: Annotated[str, typer.Option(help="compact, or paper (the paper's networks and procedure).")] = "compact",
+    minutes: Annotated[float | None, typer.Option(help="Time for this run.")] = None,
+    steps: Annotated[int | None, typer.Option(help="Steps for each network, over all runs.")] = None,
+    seed: Annotated[int, typer.Option(help="Of samples and initial weights.")] = 0,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint in the folder.")] = False,
+    device: Annotated[str | None, typer.Option(help="cpu or cuda; the default is the best there is.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Train networks on samples straight from the generator; say --minutes or --steps."""
+    with _errors():
+        from dataclasses import asdict
+
+        from sketchcore.train import Run
+        from sketchcore.train import train as run_training
+
+        run = Run(out, preset, minutes, steps, seed, device)
+        stages = run_training(run, resume=resume, quiet=as_json)
+    if as_json:
+        typer.echo(json.dumps([asdict(stage) for stage in stages]))
+    else:
+        typer.echo(f"wrote {out / 'weights.safetensors'}")
+
+
+@app.command()
+def evaluate(
+    model: Model = None,
+    shapes: Annotated[int | None, typer.Option(help="The first so many shapes; all 500 by default.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Also write a plot, as PNG.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Measure accuracy on the fixed test set: IoU by views and rounds, carving, ceiling, viewpoint."""
+    with _errors():
+        from sketchcore.evaluate import evaluate as measure
+        from sketchcore.evaluate.present import as_table, save_plot
+
+        with _bar("shapes", shapes or 500) as show:
+            report = measure(sk.load_model(model), shapes, progress=lambda done, total: show(done))
+        if plot is not None:
+            save_plot(report, plot)
+    if as_json:
+        typer.echo(json.dumps(report.to_dict()))
+    else:
+        _console.print(as_table(report))
+
+
+if __name__ == "__main__":
+    app()

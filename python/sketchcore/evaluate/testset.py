@@ -1,0 +1,71 @@
+"""The fixed test set: 500 abstract shapes, four cameras each. No network is trained on it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.resources import files
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sketchcore.camera import VIEWPOINTS, Camera
+from sketchcore.grids import draw, frustum, voxelize
+from sketchcore.shape import Shape
+
+ORTHOGONAL = ("front", "top", "right", "back")
+"""Viewpoints of the second kind of carving, in the paper's order (section 6.5)."""
+
+
+@dataclass(frozen=True)
+class Example:
+    """One shape of the test set.
+
+    Attributes:
+        shape: its primitives.
+        cameras: four, the first one of the eight three-quarter views.
+        viewpoint: name of the first camera's viewpoint.
+    """
+
+    shape: Shape
+    cameras: tuple[Camera, ...]
+    viewpoint: str
+
+    @cached_property
+    def world(self) -> NDArray[np.uint8]:
+        """uint8 [64, 64, 64], the truth in the world grid."""
+        return voxelize(self.shape)
+
+    @cached_property
+    def drawings(self) -> NDArray[np.uint8]:
+        """uint8 [4, 256, 256], exact drawings from the cameras."""
+        return np.stack([draw(self.shape, camera) for camera in self.cameras])
+
+    @cached_property
+    def orthogonal(self) -> tuple[NDArray[np.uint8], list[Camera]]:
+        """Drawings from front, top, right and back, and their cameras."""
+        cameras = [VIEWPOINTS[name] for name in ORTHOGONAL]
+        return np.stack([draw(self.shape, camera) for camera in cameras]), cameras
+
+    def frustum(self, view: int) -> NDArray[np.float32]:
+        """float32 [64, 64, 64] in 0..1, the truth in a camera's grid."""
+        return frustum(self.shape, self.cameras[view]).astype(np.float32) / np.float32(255)
+
+
+def load_testset(shapes: int | None = None) -> Iterator[Example]:
+    """The first `shapes` examples; all 500 for None.
+
+    Raises:
+        ValueError: for a number outside 1 ... 500.
+    """
+    data = json.loads((files("sketchcore.evaluate") / "abstract-500.json").read_text())
+    total = len(data["shapes"])
+    if shapes is not None and not 1 <= shapes <= total:
+        raise ValueError(f"shapes must lie between 1 and {total}, got {shapes}")
+    lens = (float(data["fov_degrees"]), float(data["near"]), float(data["far"]))
+    names = list(VIEWPOINTS)
+    for entry in data["shapes"][:shapes]:
+        cameras = tuple(Camera(c["position"], c["rotation"], *lens) for c in entry["cameras"])
+        yield Example(Shape.from_json(entry), cameras, names[entry["cameras"][0]["viewpoint"]])
