@@ -1,6 +1,5 @@
 """Settings for the whole suite: repeatable random tests, and the slow ones last."""
 
-import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile("sketchcore", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])

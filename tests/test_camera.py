@@ -2,10 +2,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-import reference
 from hypothesis import given
 from hypothesis import strategies as st
 
+import reference
 from sketchcore import _core
 from sketchcore.camera import QUARTER_VIEWS, VIEWPOINTS, Camera, as_camera, pack_cameras
 
@@ -108,7 +108,13 @@ DEGENERATE = [
 
 @pytest.mark.parametrize(("change", "message"), DEGENERATE)
 def test_degenerate_cameras_are_refused(change, message):
-    entries = {"position": GOOD.position, "rotation": GOOD.rotation, "fov_degrees": 45, "near": 1.25, "far": 2.75}
+    entries = {
+        "position": GOOD.position,
+        "rotation": GOOD.rotation,
+        "fov_degrees": 45,
+        "near": 1.25,
+        "far": 2.75,
+    }
     entries |= change
     with pytest.raises(ValueError, match=message):
         Camera(**entries)

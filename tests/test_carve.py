@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
-import reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import reference
 from sketchcore import _core
 from sketchcore.camera import VIEWPOINTS
 from sketchcore.grids import carve, draw, silhouette, voxelize

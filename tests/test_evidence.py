@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
-import reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import reference
 from sketchcore import _core
 from sketchcore.camera import VIEWPOINTS, pack_cameras
 from sketchcore.grids import draw, voxelize
@@ -38,7 +38,13 @@ def test_fields_of_a_straight_line():
 
 @pytest.mark.slow
 @settings(max_examples=10)
-@given(reference.shapes(5), NAMES, st.booleans(), st.lists(st.floats(-0.05, 0.05), min_size=3, max_size=3), st.data())
+@given(
+    reference.shapes(5),
+    NAMES,
+    st.booleans(),
+    st.lists(st.floats(-0.05, 0.05), min_size=3, max_size=3),
+    st.data(),
+)
 def test_evidence_is_gathered_along_projections(shape, names, mirror, offset, data):
     target = data.draw(st.integers(0, len(names) - 1))
     cameras = [VIEWPOINTS[name] for name in names]

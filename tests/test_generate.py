@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import reference
 from scipy import ndimage
 
+import reference
 from sketchcore import _core
 from sketchcore.camera import QUARTER_VIEWS, VIEWPOINTS
 from sketchcore.datagen import Batch, default_config, generate
@@ -65,7 +65,10 @@ def test_a_sample_is_the_same_however_it_is_asked_for(batch):
     same(cut(generate(4, 3, views=13), slice(3), 3), cut(batch, slice(3), 3))
     same(generate(4, 2, views=3, config=default_config()), cut(batch, slice(2), 3))
     hand = {"hand": {"share": 0.5}}
-    same(generate(4, 3, views=2, config=hand, first=5), cut(generate(4, 8, views=4, config=hand), slice(5, 8), 2))
+    same(
+        generate(4, 3, views=2, config=hand, first=5),
+        cut(generate(4, 8, views=4, config=hand), slice(5, 8), 2),
+    )
 
 
 def test_seeds_and_samples_differ(batch):

@@ -36,7 +36,10 @@ KERNELS = {
     "lines": (_core.lines, {"depth": DEPTH, "normal": NORMAL, "depth_step": 0.01, "crease_degrees": 30.0}),
     "draw": (_core.draw, {"shape": ROWS, "camera": CAMERA}),
     "to_camera_grid": (_core.to_camera_grid, {"volumes": VOLUMES, "cameras": CAMERAS}),
-    "to_world_grid": (_core.to_world_grid, {"volumes": VOLUMES, "cameras": CAMERAS, "into": np.zeros_like(VOLUMES)}),
+    "to_world_grid": (
+        _core.to_world_grid,
+        {"volumes": VOLUMES, "cameras": CAMERAS, "into": np.zeros_like(VOLUMES)},
+    ),
     "silhouettes": (_core.silhouettes, {"drawings": DRAWINGS}),
     "carve": (_core.carve, {"drawings": DRAWINGS, "cameras": CAMERAS}),
     "evidence_fields": (_core.evidence_fields, {"drawings": DRAWINGS}),
@@ -156,7 +159,7 @@ def test_empty_inputs():
 
 def test_counts_must_agree():
     for function in (to_camera_grid, to_world_grid):
-        with pytest.raises(ValueError, match="one for each of the 2 .*got 1"):
+        with pytest.raises(ValueError, match=r"one for each of the 2 .*got 1"):
             function(VOLUMES, [FRONT])
     with pytest.raises(ValueError, match="2 drawings, 1 cameras"):
         carve(DRAWINGS, [FRONT])
@@ -166,7 +169,7 @@ def test_counts_must_agree():
         ("carve", {"cameras": CAMERAS[:1]}),
         ("evidence", {"fields": FIELDS[:1]}),
     ):
-        with pytest.raises(ValueError, match="one for each of the 2 .*, got 1"):
+        with pytest.raises(ValueError, match=r"one for each of the 2 .*, got 1"):
             call(kernel, **change)
     with pytest.raises(ValueError, match="target must be below the number of cameras, 2; got 2"):
         call("evidence", target=2)

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 from scipy import ndimage
 
+import reference
 from sketchcore import _core
 from sketchcore.camera import VIEWPOINTS, Camera
 from sketchcore.datagen import generate

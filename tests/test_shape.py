@@ -2,9 +2,9 @@ import json
 
 import numpy as np
 import pytest
-import reference
 from hypothesis import given
 
+import reference
 from sketchcore.shape import Cuboid, Cylinder, Shape
 
 BOX = Cuboid((0, 0, 0), (0.1, 0.2, 0.3))
@@ -27,7 +27,8 @@ def test_packed_rows_are_kind_op_center_half():
 
 
 def test_json_is_the_fixed_test_sets():
-    text = '{"primitives": [{"kind": "cylinder", "axis": "x", "center": [0.1, 0, 0], "half": [1, 2, 3], "op": "add"}], "cameras": []}'
+    entry = '{"kind": "cylinder", "axis": "x", "center": [0.1, 0, 0], "half": [1, 2, 3], "op": "add"}'
+    text = f'{{"primitives": [{entry}], "cameras": []}}'
     assert Shape.from_json(text) == Shape([Cylinder((0.1, 0, 0), (1, 2, 3), "x")])
     assert json.loads(Shape([BOX]).to_json()) == {
         "primitives": [{"kind": "cuboid", "center": [0, 0, 0], "half": [0.1, 0.2, 0.3], "op": "add"}]
@@ -55,8 +56,16 @@ def test_numbers_of_any_kind_become_floats():
         (lambda: Shape.from_json("{"), ValueError, "Expecting property name"),
         (lambda: Shape.from_json("[]"), ValueError, '"primitives"'),
         (lambda: Shape.from_json('{"primitives": []}'), ValueError, "at least one primitive"),
-        (lambda: Shape.from_json({"primitives": [{"kind": "cone"}]}), ValueError, "primitive 0 has kind 'cone'"),
-        (lambda: Shape.from_json({"primitives": [{"kind": "cuboid"}]}), ValueError, "primitive 0 has no 'center'"),
+        (
+            lambda: Shape.from_json({"primitives": [{"kind": "cone"}]}),
+            ValueError,
+            "primitive 0 has kind 'cone'",
+        ),
+        (
+            lambda: Shape.from_json({"primitives": [{"kind": "cuboid"}]}),
+            ValueError,
+            "primitive 0 has no 'center'",
+        ),
         (
             lambda: Shape.from_json({"primitives": [{"kind": "cuboid", "center": [0, 0, 0], "half": [1, 1, "a"]}]}),
             ValueError,

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-import reference
 from hypothesis import given, settings
 
+import reference
 from sketchcore.grids import voxelize
 from sketchcore.shape import Cuboid, Cylinder, Shape
 

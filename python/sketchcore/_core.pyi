@@ -13,6 +13,7 @@ __all__ = [
     "evidence_fields",
     "frustum",
     "generate",
+    "isosurface",
     "lines",
     "silhouettes",
     "to_camera_grid",
@@ -26,6 +27,9 @@ def voxelize(shape: NDArray[np.float64]) -> NDArray[np.uint8]: ...
 def frustum(shape: NDArray[np.float64], camera: NDArray[np.float64], rays: int) -> NDArray[np.uint8]: ...
 def buffers(
     shape: NDArray[np.float64], camera: NDArray[np.float64], size: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
+def isosurface(
+    volume: NDArray[np.float32], level: float, camera: NDArray[np.float64], size: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
 def lines(
     depth: NDArray[np.float32], normal: NDArray[np.float32], depth_step: float, crease_degrees: float

@@ -10,6 +10,7 @@
 //!
 //! drawing -> distance -> carve, evidence                     what drawings say about space
 //! resample                                                   world grid <-> camera grid
+//! isosurface                                                 a volume as a camera sees it
 //! mesh                                                       the surface that leaves the package
 //! ```
 //!
@@ -24,6 +25,7 @@ pub mod distance;
 pub mod error;
 pub mod evidence;
 pub mod grammar;
+pub mod isosurface;
 pub mod lines;
 pub mod mesh;
 pub mod pen;

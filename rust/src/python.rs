@@ -172,7 +172,26 @@ fn buffers<'py>(
 ) -> PyResult<BufferArrays<'py>> {
     let (shape, camera) = (shape_of(&shape)?, camera_of(&camera)?);
     check_size(size)?;
-    let made = py.detach(|| Buffers::of_shape(&shape, &camera, size))?;
+    buffer_arrays(py, py.detach(|| Buffers::of_shape(&shape, &camera, size))?)
+}
+
+#[pyfunction]
+fn isosurface<'py>(
+    py: Python<'py>,
+    volume: PyReadonlyArrayDyn<'py, f32>,
+    level: f32,
+    camera: PyReadonlyArrayDyn<'py, f64>,
+    size: usize,
+) -> PyResult<BufferArrays<'py>> {
+    let camera = camera_of(&camera)?;
+    let volume = checked(&volume, "volume", &[SIDE as isize; 3])?;
+    all_finite(volume, "volume")?;
+    check_size(size)?;
+    buffer_arrays(py, py.detach(|| crate::isosurface::cast(volume, level, &camera, size)))
+}
+
+fn buffer_arrays<'py>(py: Python<'py>, made: Buffers) -> PyResult<BufferArrays<'py>> {
+    let size = made.size;
     let depth = made.depth.into_pyarray(py).reshape([size, size])?;
     let normal = made.normal.into_flattened().into_pyarray(py).reshape([size, size, 3])?;
     Ok((depth, normal))
@@ -394,7 +413,7 @@ fn bilateral<'py>(
 mod _core {
     #[pymodule_export]
     use super::{
-        bilateral, buffers, carve, default_config, draw, evidence, evidence_fields, frustum, generate, lines,
-        silhouettes, to_camera_grid, to_world_grid, viewpoints, voxelize,
+        bilateral, buffers, carve, default_config, draw, evidence, evidence_fields, frustum, generate,
+        isosurface, lines, silhouettes, to_camera_grid, to_world_grid, viewpoints, voxelize,
     };
 }

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Reads a volume between its cells' centres, at a position in cells; what lies outside the volume is 0.
-fn trilinear(volume: &[f32], at: Vec3) -> f32 {
+pub(crate) fn trilinear(volume: &[f32], at: Vec3) -> f32 {
     let side = SIDE as f32;
     if !(at.min_element() > -1.0 && at.max_element() < side) {
         return 0.0;

@@ -1,0 +1,172 @@
+"""Training: it learns, it survives a kill, it goes on where it stopped, and says what is wrong."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+import sketchcore as sk
+from sketchcore.nets.weights import load_weights
+from sketchcore.train import PRESETS, Run, train
+from sketchcore.train.chains import ChainSource, start_chain
+from sketchcore.train.checkpoint import load_checkpoint
+
+TINY = {"stem": 8, "widths": (16, 16, 16), "blocks": (1, 1, 1), "groups": 2}
+
+
+def tiny(out: Path, **changes: Any) -> Run:
+    return Run(out, options=TINY, changes={"batch": 2, "warmup": 2}, **changes)
+
+
+def test_the_papers_constants() -> None:
+    paper = PRESETS["paper"]
+    assert (paper.rate, paper.betas, paper.stages) == (2e-4, (0.5, 0.999), ("single", "updater"))
+    assert (paper.weight_decay, paper.warmup, paper.cooldown, paper.average, paper.clip) == (0, 0, 0, 0, 0)
+    assert paper.generator == {}
+
+
+def test_a_short_run_leaves_weights_that_load(tmp_path: Path) -> None:
+    [progress] = train(tiny(tmp_path, steps=3), quiet=True)
+    assert progress.step == 3
+    assert progress.samples >= 2
+    assert progress.iou is not None
+    state, config = load_weights(tmp_path / "weights.safetensors")
+    assert config["network"] == "compact"
+    assert config["training"]["runs"][0]["step"] == 3
+    solid = sk.reconstruct(
+        sk.generate(0, 1).drawings[0, 0], "quarter-037", iterations=1, model=tmp_path / "weights.safetensors"
+    )
+    assert solid.probability.shape == (64, 64, 64)
+
+
+def test_resuming_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    train(tiny(tmp_path, steps=2), quiet=True)
+    before = load_checkpoint(tmp_path / "compact.checkpoint.safetensors")
+    [progress] = train(tiny(tmp_path, steps=4), resume=True, quiet=True)
+    after = load_checkpoint(tmp_path / "compact.checkpoint.safetensors")
+    assert progress.step == after.progress.step == 4
+    assert progress.samples > before.progress.samples
+    assert progress.seconds > before.progress.seconds
+    assert float(after.moments[0]["step"]) == 4
+    assert any(not torch.equal(before.model[k], after.model[k]) for k in before.model)
+
+
+def test_a_finished_run_resumed_changes_no_weight(tmp_path: Path) -> None:
+    train(tiny(tmp_path, steps=2), quiet=True)
+    before, _ = load_weights(tmp_path / "weights.safetensors")
+    train(tiny(tmp_path, steps=2), resume=True, quiet=True)
+    after, _ = load_weights(tmp_path / "weights.safetensors")
+    assert all(torch.equal(before[k], after[k]) for k in before)
+
+
+def test_the_paper_preset_trains_both_networks(tmp_path: Path) -> None:
+    run = Run(tmp_path, "paper", steps=2, options={"width": 4}, changes={"batch": 2})
+    single, updater = train(run, quiet=True)
+    assert (single.stage, updater.stage) == ("single", "updater")
+    assert single.step == updater.step == 2
+    model = sk.load_model(tmp_path / "weights.safetensors")
+    drawings = sk.generate(0, 1, views=2).drawings[0]
+    solid = sk.reconstruct(list(drawings), ["quarter-037", "top"], iterations=1, model=model)
+    assert np.isfinite(solid.probability).all()
+    single_again, updater_again = train(
+        Run(tmp_path, "paper", steps=3, options={"width": 4}, changes={"batch": 2}), resume=True, quiet=True
+    )
+    assert single_again.step == 2, "the single view is what the updater was trained on: it stays"
+    assert updater_again.step == 3
+
+
+KILLED = """
+import sys
+from pathlib import Path
+from sketchcore.train import Run, train
+tiny = {"stem": 8, "widths": (16, 16, 16), "blocks": (1, 1, 1), "groups": 2}
+run = Run(Path(sys.argv[1]), steps=10_000, save_every=0.0, options=tiny, changes={"batch": 2})
+train(run, resume=len(sys.argv) > 2, quiet=True)
+"""
+
+
+def test_a_killed_run_is_resumed(tmp_path: Path) -> None:
+    checkpoint = tmp_path / "compact.checkpoint.safetensors"
+    step = 0
+    for attempt in range(2):
+        arguments = [sys.executable, "-c", KILLED, str(tmp_path), *(["resume"] if attempt else [])]
+        process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        deadline = time.monotonic() + 120
+        while time.monotonic() < deadline:
+            if checkpoint.exists() and load_checkpoint(checkpoint).progress.step > step + 2:
+                break
+            assert process.poll() is None, process.stderr and process.stderr.read()
+            time.sleep(0.05)
+        os.kill(process.pid, signal.SIGKILL)
+        process.communicate()
+        found = load_checkpoint(checkpoint)
+        assert found.progress.step > step
+        step = found.progress.step
+    [progress] = train(tiny(tmp_path, steps=step + 1), resume=True, quiet=True)
+    assert progress.step == step + 1
+
+
+def test_a_chain_is_a_function_of_seed_and_index() -> None:
+    preset = PRESETS["compact"]
+    one, two = start_chain(preset, 5, 9), start_chain(preset, 5, 9)
+    assert one.length == two.length
+    np.testing.assert_array_equal(one.drawings, two.drawings)
+    np.testing.assert_array_equal(one.cameras, two.cameras)
+    counts = {len(start_chain(preset, 5, i).drawings) for i in range(30)}
+    assert counts == {1, 2, 3, 4}
+
+
+def test_a_source_goes_through_the_indices_in_order() -> None:
+    preset = PRESETS["compact"]
+    source = ChainSource(preset, 5, first=7)
+    try:
+        for index, chain in zip(range(7, 11), source, strict=False):
+            np.testing.assert_array_equal(chain.cameras, start_chain(preset, 5, index).cameras)
+    finally:
+        source.close()
+
+
+def test_a_source_hands_its_errors_on() -> None:
+    from dataclasses import replace
+
+    source = ChainSource(replace(PRESETS["compact"], generator={"gramar": 1}), 0, first=0)
+    with pytest.raises(ValueError, match="gramar"):
+        next(iter(source))
+    source.close()
+
+
+def test_wrong_runs_say_what_would_be_right(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="presets are paper, compact"):
+        Run(tmp_path, "big", steps=1)
+    with pytest.raises(ValueError, match="either minutes or steps"):
+        Run(tmp_path)
+    with pytest.raises(ValueError, match="either minutes or steps"):
+        Run(tmp_path, minutes=1, steps=1)
+    with pytest.raises(ValueError, match="more than 0"):
+        Run(tmp_path, steps=-1)
+    with pytest.raises(ValueError, match="seed must lie"):
+        Run(tmp_path, steps=1, seed=2**63)
+    with pytest.raises(FileNotFoundError, match="start without --resume"):
+        train(tiny(tmp_path, steps=1), resume=True, quiet=True)
+    (tmp_path / "compact.checkpoint.safetensors").write_bytes(b"no checkpoint")
+    with pytest.raises(FileExistsError, match="--resume"):
+        train(tiny(tmp_path, steps=1), quiet=True)
+    with pytest.raises(ValueError, match="is no checkpoint"):
+        train(tiny(tmp_path, steps=1), resume=True, quiet=True)
+
+
+def test_the_config_beside_the_weights_is_json(tmp_path: Path) -> None:
+    train(tiny(tmp_path, steps=1), quiet=True)
+    config = json.loads((tmp_path / "weights.json").read_text())
+    assert config["training"]["rate"] == PRESETS["compact"].rate
+    assert config["options"]["widths"] == [16, 16, 16]
