@@ -60,9 +60,7 @@ class Ring:
 
 def box(letter: str, low: tuple[float, ...], high: tuple[float, ...]) -> dict:
     ends = (low, high)
-    return {
-        f"{letter}{i}{j}{k}": (ends[i][0], ends[j][1], ends[k][2]) for i, j, k in product((0, 1), repeat=3)
-    }
+    return {f"{letter}{i}{j}{k}": (ends[i][0], ends[j][1], ends[k][2]) for i, j, k in product((0, 1), repeat=3)}
 
 
 def profile(points: dict[str, tuple[float, float]], **sides: float) -> dict:

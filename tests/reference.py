@@ -212,9 +212,17 @@ def lines(depth, normal, depth_step=0.006, crease_degrees=30.0, slack=0.0):
         second = tuple(slice(1, None) if a == axis else slice(None) for a in (0, 1))
         cosine = (normal[first] * normal[second]).sum(axis=-1)
         crease = (cosine < np.cos(np.radians(crease_degrees)) - slack) & seen[first] & seen[second]
+        # The nearer pixel carries the line; of two equally near ones the face that faces more up, then +x, then +z.
         step = here[second] - here[first]
-        ink[second] |= crease & (step > depth_step + slack)
-        ink[first] |= crease & (step <= depth_step - slack)
+        facing = normal @ np.array([0.32, 1.0, 0.11])
+        order = facing[first] - facing[second]
+        level = np.abs(step) <= depth_step - slack
+        ink[second] |= crease & ((step > depth_step + slack) | (level & (order < -slack)))
+        ink[first] |= crease & ((step < -depth_step - slack) | (level & (order >= slack)))
+        if slack < 0:  # too close to call: either may have it
+            close = crease & ((np.abs(np.abs(step) - depth_step) <= -slack) | (level & (np.abs(order) <= -slack)))
+            ink[first] |= close
+            ink[second] |= close
     return ink
 
 
@@ -291,17 +299,17 @@ def project(camera, points):
     return (p[..., :2] / (p[..., 2:] * half) + 1) / 2 * IMAGE, p[..., 2]
 
 
-def look_up(image, camera, points, slack):
+def look_up(image, camera, points, slack, shift=0.0):
     """The least and the greatest value (0 beyond the image) of the pixels that a point may fall into.
 
-    Points that fall closer than `slack` pixels to the border between pixels may fall to either side.
+    They are looked up `shift` pixels to the right and below. Points that fall closer than `slack` pixels to the border between pixels may fall to either side.
     """
     at, depths = project(camera, points)
     padded = np.pad(image.astype(np.int16), 1)
     found = []
     for dx, dy in ((-slack, -slack), (-slack, slack), (slack, -slack), (slack, slack)):
-        x = np.clip(np.floor(at[..., 0] + dx), -1, IMAGE).astype(int) + 1
-        y = np.clip(np.floor(at[..., 1] + dy), -1, IMAGE).astype(int) + 1
+        x = np.clip(np.floor(at[..., 0] + shift + dx), -1, IMAGE).astype(int) + 1
+        y = np.clip(np.floor(at[..., 1] + shift + dy), -1, IMAGE).astype(int) + 1
         found.append(np.where(depths > 0, padded[y, x], 0))
     return np.minimum.reduce(found), np.maximum.reduce(found)
 
@@ -320,6 +328,10 @@ def fields(drawing):
     return np.round(np.clip(np.stack([128 + 8 * signed, nearness], axis=-1), 0, 255)).astype(np.uint8)
 
 
+# A cell's own ray ends in the corner of four pixels; the kernel looks this far to the right and below, in pixels.
+EVIDENCE_SHIFT = 0.01
+
+
 def evidence(fields, cameras, target, mirror, slack=2e-3):
     """Hull and match of every cell of one camera's grid, [2, 64, 64, 64]: the least they may be, and the greatest."""
     points = cell_centers(cameras[target])
@@ -327,9 +339,9 @@ def evidence(fields, cameras, target, mirror, slack=2e-3):
     for j, (camera, field) in enumerate(zip(cameras, fields, strict=True)):
         for side in (1, -1) if mirror else (1,):
             seen = points * np.array([1, 1, side])
-            hulls.append(look_up(field[..., 0], camera, seen, slack))
+            hulls.append(look_up(field[..., 0], camera, seen, slack, EVIDENCE_SHIFT))
             if j != target or side < 0:
-                matches.append(look_up(field[..., 1], camera, seen, slack))
+                matches.append(look_up(field[..., 1], camera, seen, slack, EVIDENCE_SHIFT))
     hull = np.min(hulls, axis=0)
     match = np.mean(matches, axis=0) if matches else np.zeros_like(hull)
     return tuple(np.stack([hull[k], match[k]]) for k in (0, 1))

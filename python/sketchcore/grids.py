@@ -154,8 +154,14 @@ def as_drawings(drawings: NDArray[np.uint8] | Sequence[NDArray[np.uint8]]) -> ND
 def silhouette(drawing: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """The inside of a drawing's outline: uint8 [256, 256], 1 inside, lines and holes included.
 
-    Gaps of up to 10 pixels in the outline are closed.
+    Gaps of up to 10 pixels in the outline are closed; so is a real opening that narrow into a wider space.
+
+    Raises:
+        ValueError: for another shape than [256, 256].
+        TypeError: for another dtype than uint8.
     """
+    if np.ndim(drawing) != 2:
+        raise ValueError(f"silhouette takes one drawing of shape [256, 256], got {list(np.shape(drawing))}")
     inside: NDArray[np.uint8] = _core.silhouettes(as_drawings(drawing))[0]
     return inside
 
@@ -172,6 +178,8 @@ def carve(drawings: NDArray[np.uint8] | Sequence[NDArray[np.uint8]], cameras: Se
         TypeError: for a wrong dtype or what is no camera.
     """
     images = as_drawings(drawings)
+    if isinstance(cameras, Camera):
+        raise TypeError("carve takes a sequence of sketchcore.Camera, one a drawing")
     if len(images) == 0:
         raise ValueError("carving needs at least one drawing")
     if len(images) != len(cameras):

@@ -61,7 +61,12 @@ impl Default for HandConfig {
 
 impl SampleConfig {
     pub fn from_json(text: &str) -> Result<Self, CoreError> {
-        let config: Self = serde_json::from_str(text).map_err(|e| CoreError::Config(e.to_string()))?;
+        let mut json = serde_json::Deserializer::from_str(text);
+        let config: Self = serde_path_to_error::deserialize(&mut json).map_err(|error| {
+            let path = error.path().to_string();
+            let reason = error.into_inner();
+            CoreError::Config(if path == "." { reason.to_string() } else { format!("{path}: {reason}") })
+        })?;
         config.check()?;
         Ok(config)
     }
@@ -80,6 +85,7 @@ impl SampleConfig {
             pen.overshoot_length,
         ];
         self.grammar.check()?;
+        self.lines.check()?;
         if !(0.0..=1.0).contains(&self.displacement) {
             return bad("displacement must lie between 0 and 1");
         }

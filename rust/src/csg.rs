@@ -80,9 +80,14 @@ impl Shape {
                 k if k == 1.0 || k == 2.0 || k == 3.0 => Kind::Cylinder { axis: k as usize - 1 },
                 kind => return Err(CoreError::UnknownKind { index, kind }),
             };
+            let additive = match row[1] {
+                0.0 => false,
+                1.0 => true,
+                op => return Err(CoreError::UnknownOp { index, op }),
+            };
             Ok(Primitive {
                 kind,
-                additive: row[1] != 0.0,
+                additive,
                 center: DVec3::new(row[2], row[3], row[4]),
                 half: DVec3::new(row[5], row[6], row[7]),
             })

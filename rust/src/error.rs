@@ -15,6 +15,8 @@ pub enum CoreError {
     ZeroSize { index: usize, half: [f64; 3] },
     #[error("primitive {index} has kind {kind}; 0 is a cuboid, 1, 2, 3 a cylinder along x, y, z")]
     UnknownKind { index: usize, kind: f64 },
+    #[error("primitive {index} has op {op}; 1 adds, 0 subtracts")]
+    UnknownOp { index: usize, op: f64 },
     #[error("camera rotation must be orthonormal with determinant +1 (rows: right, down, forward)")]
     NotARotation,
     #[error("camera fov_degrees must lie between 0 and 180, got {0}")]

@@ -94,6 +94,8 @@ const OUTSIDE: u32 = u32::MAX;
 fn pixels_along(start: Vec3, step: Vec3, depths: &[f32; SIDE], camera: &Camera) -> [u32; SIDE] {
     let half = 0.5 * IMAGE as f32;
     let focal = half / camera.half_image as f32;
+    // A cell's own ray ends in the corner of four pixels: rounding shall not choose between them.
+    let half = half + 0.01;
     depths.map(|depth| {
         let p = start + step * depth;
         let scale = focal / p.z;

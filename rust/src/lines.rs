@@ -6,6 +6,7 @@
 //! neighbours from the border, never gets in.
 
 use crate::buffers::Buffers;
+use crate::error::CoreError;
 use serde::{Deserialize, Serialize};
 
 /// When a change of depth or normal is a line.
@@ -21,6 +22,19 @@ pub struct LineConfig {
 impl Default for LineConfig {
     fn default() -> Self {
         Self { depth_step: 0.006, crease_degrees: 30.0 }
+    }
+}
+
+impl LineConfig {
+    /// Says which threshold makes no sense.
+    pub fn check(&self) -> Result<(), CoreError> {
+        if !(self.depth_step > 0.0 && self.depth_step.is_finite()) {
+            return Err(CoreError::Config("lines.depth_step must be more than 0 and finite".into()));
+        }
+        if !(0.0..=180.0).contains(&self.crease_degrees) {
+            return Err(CoreError::Config("lines.crease_degrees must lie between 0 and 180".into()));
+        }
+        Ok(())
     }
 }
 
@@ -51,14 +65,22 @@ pub fn detect(buffers: &Buffers, config: &LineConfig) -> Vec<bool> {
                 if other == 0.0 || dot(buffers.normal[i], buffers.normal[j]) >= cos_crease {
                     continue;
                 }
-                // The crease belongs to what is in front; where both are equally far, to the first.
-                let behind = other - here > config.depth_step;
-                ink[if behind { j } else { i }] = true;
+                // The crease belongs to what is in front; where both are equally far, to the same face all along.
+                let ahead = here - other;
+                let owns = if ahead.abs() > config.depth_step {
+                    ahead > 0.0
+                } else {
+                    dot(buffers.normal[i], FACE_ORDER) >= dot(buffers.normal[j], FACE_ORDER)
+                };
+                ink[if owns { i } else { j }] = true;
             }
         }
     }
     ink
 }
+
+/// Of two faces that meet in a crease, the one whose normal has more of this carries the line: tops before sides.
+const FACE_ORDER: [f32; 3] = [0.32, 1.0, 0.11];
 
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

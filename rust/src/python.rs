@@ -42,6 +42,10 @@ fn checked<'a, T: Element>(
     shape: &[isize],
 ) -> PyResult<&'a [T]> {
     check_shape(array.shape(), what, shape)?;
+    // `as_slice` alone would take Fortran order as well.
+    if !array.is_c_contiguous() {
+        return Err(not_contiguous(what));
+    }
     array.as_slice().map_err(|_| not_contiguous(what))
 }
 
@@ -51,6 +55,9 @@ fn checked_mut<'a, T: Element>(
     shape: &[isize],
 ) -> PyResult<&'a mut [T]> {
     check_shape(array.shape(), what, shape)?;
+    if !array.is_c_contiguous() {
+        return Err(not_contiguous(what));
+    }
     array.as_slice_mut().map_err(|_| not_contiguous(what))
 }
 
@@ -143,12 +150,13 @@ fn frustum<'py>(
     py: Python<'py>,
     shape: PyReadonlyArrayDyn<'py, f64>,
     camera: PyReadonlyArrayDyn<'py, f64>,
-    rays: usize,
+    rays: i64,
 ) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
     let (shape, camera) = (shape_of(&shape)?, camera_of(&camera)?);
     if !(1..=16).contains(&rays) {
         return Err(PyValueError::new_err(format!("rays must lie between 1 and 16, got {rays}")));
     }
+    let rays = rays as usize;
     let mut cells = vec![0; CELLS];
     py.detach(|| fill_frustum(&shape, &camera, rays, &mut cells))?;
     grid(py, cells, &[])
@@ -156,9 +164,9 @@ fn frustum<'py>(
 
 type BufferArrays<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray3<f32>>);
 
-fn check_size(size: usize) -> PyResult<()> {
+fn check_size(size: i64) -> PyResult<usize> {
     if (1..=4096).contains(&size) {
-        return Ok(());
+        return Ok(size as usize);
     }
     Err(PyValueError::new_err(format!("size must lie between 1 and 4096 pixels, got {size}")))
 }
@@ -168,10 +176,10 @@ fn buffers<'py>(
     py: Python<'py>,
     shape: PyReadonlyArrayDyn<'py, f64>,
     camera: PyReadonlyArrayDyn<'py, f64>,
-    size: usize,
+    size: i64,
 ) -> PyResult<BufferArrays<'py>> {
     let (shape, camera) = (shape_of(&shape)?, camera_of(&camera)?);
-    check_size(size)?;
+    let size = check_size(size)?;
     buffer_arrays(py, py.detach(|| Buffers::of_shape(&shape, &camera, size))?)
 }
 
@@ -181,12 +189,12 @@ fn isosurface<'py>(
     volume: PyReadonlyArrayDyn<'py, f32>,
     level: f32,
     camera: PyReadonlyArrayDyn<'py, f64>,
-    size: usize,
+    size: i64,
 ) -> PyResult<BufferArrays<'py>> {
     let camera = camera_of(&camera)?;
     let volume = checked(&volume, "volume", &[SIDE as isize; 3])?;
     all_finite(volume, "volume")?;
-    check_size(size)?;
+    let size = check_size(size)?;
     buffer_arrays(py, py.detach(|| crate::isosurface::cast(volume, level, &camera, size)))
 }
 
@@ -205,16 +213,18 @@ fn lines<'py>(
     depth_step: f32,
     crease_degrees: f32,
 ) -> PyResult<Bound<'py, PyArray2<u8>>> {
-    let size = depth.shape().first().copied().unwrap_or(0);
-    check_size(size)?;
+    let size = check_size(depth.shape().first().map_or(0, |&s| s as i64))?;
     let side = size as isize;
     let depth = checked(&depth, "depth", &[side, side])?.to_vec();
     let normal = checked(&normal, "normal", &[side, side, 3])?.as_chunks::<3>().0.to_vec();
+    all_finite(normal.as_flattened(), "normal")?;
     if depth.iter().any(|d| d.is_nan() || *d <= 0.0) {
         let message = "depth must be more than 0 everywhere, infinite where nothing is seen";
         return Err(PyValueError::new_err(message));
     }
-    let (made, config) = (Buffers { depth, normal, size }, LineConfig { depth_step, crease_degrees });
+    let made = Buffers { depth, normal, size };
+    let config = LineConfig { depth_step, crease_degrees };
+    config.check()?;
     let ink = py.detach(|| detect(&made, &config));
     let bytes: Vec<u8> = ink.iter().map(|&i| if i { 255 } else { 0 }).collect();
     bytes.into_pyarray(py).reshape([size, size])
@@ -261,6 +271,7 @@ fn to_world_grid<'py>(
     let volumes = checked(&volumes, "volumes", &GRIDS)?;
     let into = checked_mut(&mut into, "into", &GRIDS)?;
     all_finite(volumes, "volume")?;
+    all_finite(into, "into")?;
     same_count("cameras", cameras.len(), volumes.len() / CELLS)?;
     same_count("into", into.len() / CELLS, cameras.len())?;
     py.detach(|| {

@@ -3,8 +3,9 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-/// Streams that one sample may use.
+/// Streams that one sample may use: purposes 0 to 31, so far apart that none runs into the next.
 const PURPOSES: u64 = 32;
+const APART: u32 = 60;
 
 /// A stream of random numbers. Uses no function of the C library, so its values are bit-identical everywhere.
 pub struct Random(ChaCha8Rng);
@@ -14,7 +15,8 @@ impl Random {
     pub fn new(seed: u64, sample: u64, purpose: u64) -> Self {
         debug_assert!(purpose < PURPOSES);
         let mut generator = ChaCha8Rng::seed_from_u64(seed);
-        generator.set_stream(sample.wrapping_mul(PURPOSES).wrapping_add(purpose));
+        generator.set_stream(sample);
+        generator.set_word_pos(u128::from(purpose) << APART);
         Self(generator)
     }
 

@@ -92,6 +92,8 @@ def generate(
             raise ValueError(f"{name} must lie between 0 and 2^64 - 1, got {value}")
     if count < 0:
         raise ValueError(f"count must be 0 or more, got {count}")
+    if first + count > 2**64:
+        raise ValueError(f"samples are numbered to 2^64 - 1; first {first} leaves none for a count of {count}")
     if not 1 <= views <= 13:
         raise ValueError(f"views must lie between 1 and 13 (there are 13 viewpoints), got {views}")
     if threads is not None and threads < 1:
