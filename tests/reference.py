@@ -302,7 +302,8 @@ def project(camera, points):
 def look_up(image, camera, points, slack, shift=0.0):
     """The least and the greatest value (0 beyond the image) of the pixels that a point may fall into.
 
-    They are looked up `shift` pixels to the right and below. Points that fall closer than `slack` pixels to the border between pixels may fall to either side.
+    They are looked up `shift` pixels to the right and below.
+    Points that fall closer than `slack` pixels to the border between pixels may fall to either side.
     """
     at, depths = project(camera, points)
     padded = np.pad(image.astype(np.int16), 1)

@@ -27,7 +27,8 @@ def solid(drawing: np.ndarray) -> sk.Reconstruction:
 def test_a_drawing_becomes_the_shape_it_shows(solid: sk.Reconstruction) -> None:
     assert solid.probability.shape == (64, 64, 64)
     assert solid.probability.dtype == np.float32
-    assert solid.probability.min() >= 0 and solid.probability.max() <= 1
+    assert solid.probability.min() >= 0
+    assert solid.probability.max() <= 1
     assert sk.iou(solid.probability, sk.voxelize(SHAPE)) > 0.6
     assert solid.views == (sk.VIEWPOINTS["quarter-037"],)
     assert len(solid.trace) == 2

@@ -40,7 +40,7 @@ def test_a_short_run_leaves_weights_that_load(tmp_path: Path) -> None:
     assert progress.step == 3
     assert progress.samples >= 2
     assert progress.iou is not None
-    state, config = load_weights(tmp_path / "weights.safetensors")
+    _, config = load_weights(tmp_path / "weights.safetensors")
     assert config["network"] == "compact"
     assert config["training"]["runs"][0]["step"] == 3
     solid = sk.reconstruct(

@@ -205,7 +205,7 @@ def test_an_error_while_writing_leaves_the_old_file_alone(tmp_path):
 
 
 def test_a_missing_folder_is_named(tmp_path):
-    with pytest.raises(FileNotFoundError, match="no folder .*absent"):
+    with pytest.raises(FileNotFoundError, match=r"no folder .*absent"):
         save_npz(tmp_path / "absent" / "volume.npz", lumpy())
 
 
