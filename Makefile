@@ -21,7 +21,7 @@ $(READY): pyproject.toml
 	touch $@
 
 # The package, editable: only a change of the Rust side or of the dependencies builds it again.
-$(BUILT): $(READY) Cargo.toml Cargo.lock $(wildcard rust/src/*.rs)
+$(BUILT): $(READY) Cargo.toml Cargo.lock $(wildcard rust/src/*.rs rust/src/*/*.rs)
 	$(BIN)/maturin develop --release --quiet
 	touch $@
 
