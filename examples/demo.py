@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 import sketchcore as sk
+from sketchcore.evaluate.outline import outline_iou, pieces
 from sketchcore.picture import save_picture
 
 HERE = Path(__file__).parent
@@ -24,7 +25,11 @@ def main() -> None:
         path = OUT / f"{example['name']}.glb"
         solid.save(path)
         save_picture(solid, path.with_suffix(".png"))
-        print(f"{path.relative_to(HERE.parent)} and .png: {len(drawings)} drawing(s), {seconds:.1f} s")
+        overlaps = ", ".join(f"{overlap:.2f}" for overlap in outline_iou(solid))
+        print(
+            f"{path.relative_to(HERE.parent)} and .png: {seconds:.1f} s, pieces: {len(pieces(solid.probability))}, "
+            f"outline overlap with each drawing: {overlaps}"
+        )
 
 
 if __name__ == "__main__":

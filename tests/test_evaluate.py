@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 import sketchcore as sk
 from sketchcore.evaluate import evaluate
 from sketchcore.evaluate.measure import Figure
+from sketchcore.evaluate.outline import outline_iou, pieces
 from sketchcore.evaluate.present import as_table, save_plot
 from sketchcore.evaluate.testset import Example, load_testset
 from sketchcore.nets.models import Sketches
@@ -52,6 +53,26 @@ def test_bootstrap_interval_of_a_known_spread() -> None:
     figure = Figure.of(np.random.default_rng(1).normal(0.5, 0.1, 400))
     assert figure.low < 0.5 < figure.high
     assert figure.high - figure.low == pytest.approx(2 * 1.96 * 0.1 / 20, rel=0.15)
+
+
+def test_outline_and_pieces_of_a_known_solid() -> None:
+    # Faces lie between voxels, so that the iso-surface is the shape's own.
+    shape = sk.Shape(
+        [sk.Cuboid((-0.25, 0, 0), (0.125, 0.1875, 0.1875)), sk.Cuboid((0.25, 0, 0), (0.0625, 0.1875, 0.1875))]
+    )
+    volume = sk.voxelize(shape).astype(np.float32)
+    names = ("quarter-037", "front")
+    views = tuple(sk.VIEWPOINTS[name] for name in names)
+    drawings = np.stack([sk.draw(shape, camera) for camera in views])
+    solid = sk.Reconstruction(volume, views, drawings=drawings)
+    assert min(outline_iou(solid)) > 0.95
+    half = sk.Reconstruction(np.where(np.arange(64)[:, None] < 32, volume, 0), views, drawings=drawings)
+    assert max(outline_iou(half)) < 0.7
+    sizes = pieces(volume)
+    assert sizes == sorted(sizes, reverse=True)
+    assert len(sizes) == 2
+    assert sum(sizes) == volume.sum()
+    assert pieces(np.zeros((64, 64, 64), np.float32)) == []
 
 
 def test_wrong_arguments(tmp_path) -> None:
