@@ -83,7 +83,9 @@ def test_loss_against_numpy() -> None:
     p = 1 / (1 + np.exp(-logits))
     log_loss = -(truth * np.log(p) + (1 - truth) * np.log(1 - p)).mean()
     both, either = (p * truth).sum((1, 2, 3)), (p + truth - p * truth).sum((1, 2, 3))
-    expected = 10 * log_loss + (1 - (both + 1) / (either + 1)).mean()
+    q, seen = 1 / (1 + np.exp(-logits.max(1))), truth.max(1)
+    outline = -(seen * np.log(q) + (1 - seen) * np.log(1 - q)).mean()
+    expected = 10 * log_loss + 2 * outline + (1 - (both + 1) / (either + 1)).mean()
     assert float(compact_loss(torch.tensor(logits), torch.tensor(truth).float())) == pytest.approx(expected, rel=1e-4)
 
 

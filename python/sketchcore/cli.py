@@ -126,7 +126,11 @@ def train(
         from sketchcore.train import train as run_training
 
         run = Run(out, preset, minutes, steps, seed, device)
-        stages = run_training(run, resume=resume, quiet=as_json)
+        try:
+            stages = run_training(run, resume=resume, quiet=as_json)
+        except KeyboardInterrupt:
+            typer.echo(f"stopped; go on with --resume -o {out}", err=True)
+            raise typer.Exit(130) from None
     if as_json:
         typer.echo(json.dumps([asdict(stage) for stage in stages]))
     else:

@@ -184,20 +184,25 @@ def _twice(x: Tensor) -> Tensor:
     return F.interpolate(x, scale_factor=2, mode="nearest")
 
 
-def compact_loss(logits: Tensor, truth: Tensor, *, log_weight: float = 10.0) -> Tensor:
-    """Log loss plus one minus the soft IoU, the mean over the batch.
+def compact_loss(logits: Tensor, truth: Tensor, *, log_weight: float = 10.0, outline_weight: float = 2.0) -> Tensor:
+    """Log loss of cells, log loss of the outline, and one minus the soft IoU; the mean over the batch.
+
+    Where the depth of a thin part is uncertain, no cell along the ray is more likely than not, and the part goes
+    missing. The outline's loss sees the most likely cell of each ray alone: something has to be there.
 
     Args:
-        logits: float [B, 64, 64, 64].
+        logits: float [B, 64, 64, 64] (depth, row, col).
         truth: float [B, 64, 64, 64], the share of each cell that is inside, 0..1.
-        log_weight: factor of the log loss (a mean over cells of which few are occupied).
+        log_weight: factor of the cells' log loss (a mean over cells of which few are occupied).
+        outline_weight: factor of the outline's log loss (a mean over rays).
     """
     logits = logits.float()
     log_loss = F.binary_cross_entropy_with_logits(logits, truth)
+    outline_loss = F.binary_cross_entropy_with_logits(logits.amax(dim=1), truth.amax(dim=1))
     p = logits.sigmoid()
     both = (p * truth).sum(dim=(1, 2, 3))
     either = (p + truth - p * truth).sum(dim=(1, 2, 3))
-    return log_weight * log_loss + (1 - (both + 1) / (either + 1)).mean()
+    return log_weight * log_loss + outline_weight * outline_loss + (1 - (both + 1) / (either + 1)).mean()
 
 
 def compact_inputs(

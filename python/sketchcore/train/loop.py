@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import copy
+import math
 import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
 import torch
+from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 from torch import Tensor, nn
@@ -188,33 +189,37 @@ class _Loop:
             assert self.run.steps is not None
             return self.progress.step / self.run.steps
 
-        with _TrainingBar(before.stage, quiet) as show:
-            while (part := done()) < 1:
-                loss = self._step(part, self.progress.step - before.step)
-                now = time.monotonic()
-                self.progress.step += 1
-                self.progress.samples = before.samples + self.stage.samples
-                self.progress.seconds = before.seconds + now - started
-                rate = self.stage.samples / (now - started)
-                if now - evaluated > self.run.evaluate_every:
-                    self.progress.iou = self._evaluate()
-                    evaluated = time.monotonic()
-                if now - saved > self.run.save_every:
-                    self._save()
-                    saved = now
-                show(part, loss, rate, self.progress)
+        with _TrainingBar(before.stage, quiet) as bar:
+            try:
+                while (part := done()) < 1:
+                    loss = self._step(part)
+                    now = time.monotonic()
+                    self.progress.step += 1
+                    self.progress.samples = before.samples + self.stage.samples
+                    self.progress.seconds = before.seconds + now - started
+                    bar.show(part, loss, self.stage.samples / (now - started), self.progress)
+                    if now - evaluated > self.run.evaluate_every:
+                        self.progress.iou = self._evaluate()
+                        bar.report(self.progress)
+                        evaluated = time.monotonic()
+                    if now - saved > self.run.save_every:
+                        self._save()
+                        saved = now
+            except KeyboardInterrupt:
+                self._save()
+                raise
             self.progress.iou = self._evaluate()
             self.progress.finished = True
             self._save()
-            show(1.0, loss if self.progress.step > before.step else float("nan"), 0.0, self.progress)
+            bar.report(self.progress)
         return self.progress
 
-    def _step(self, part: float, since: int) -> float:
+    def _step(self, part: float) -> float:
         c = self.constants
         self.stage.model.train()
         rate = c.rate
         if c.warmup:
-            rate *= min(1.0, (since + 1) / c.warmup)
+            rate *= min(1.0, (self.progress.step + 1) / c.warmup)
         if c.cooldown:
             rate *= min(1.0, (1 - part) / c.cooldown)
         for group in self.optimizer.param_groups:
@@ -222,7 +227,7 @@ class _Loop:
         self.optimizer.zero_grad(set_to_none=True)
         loss = self.stage.step()
         value = float(loss.detach())
-        if value != value or value in (float("inf"), float("-inf")):
+        if not math.isfinite(value):
             raise FloatingPointError(f"the loss is {value} at step {self.progress.step}; try a lower rate")
         loss.backward()  # type: ignore[no-untyped-call]
         if c.clip:
@@ -275,7 +280,7 @@ def _save_weights(run: Run, trained: dict[str, nn.Module], results: list[Progres
 
 
 class _TrainingBar:
-    """A progress bar with samples/s and held-out IoU; nothing when quiet."""
+    """A progress bar with samples/s and held-out IoU, and a line for each measurement; nothing when quiet."""
 
     def __init__(self, title: str, quiet: bool) -> None:
         self._bar = Bar(
@@ -283,20 +288,28 @@ class _TrainingBar:
             BarColumn(),
             TextColumn("{task.percentage:3.0f} %  {task.fields[note]}"),
             TimeRemainingColumn(),
-            disable=quiet,
+            console=Console(stderr=True, quiet=quiet),
         )
         self._task = self._bar.add_task(title, total=1.0, note="")
-        self._smooth: float | None = None
+        self._loss = float("nan")
 
-    def __enter__(self) -> Callable[[float, float, float, Progress], None]:
+    def __enter__(self) -> _TrainingBar:
         self._bar.start()
-        return self._show
+        return self
 
     def __exit__(self, *_: object) -> None:
         self._bar.stop()
 
-    def _show(self, part: float, loss: float, rate: float, progress: Progress) -> None:
-        self._smooth = loss if self._smooth is None else 0.98 * self._smooth + 0.02 * loss
+    def show(self, part: float, loss: float, rate: float, progress: Progress) -> None:
+        """After a step: how far, the loss (smoothed), new shapes a second."""
+        self._loss = loss if math.isnan(self._loss) else 0.98 * self._loss + 0.02 * loss
         iou = "..." if progress.iou is None else f"{progress.iou:.3f}"
-        note = f"loss {self._smooth:.4f}  {rate:.1f} samples/s  held-out IoU {iou}  {progress.samples:,} samples"
+        note = f"loss {self._loss:.3f}  {rate:.1f} samples/s  held-out IoU {iou}"
         self._bar.update(self._task, completed=part, note=note)
+
+    def report(self, progress: Progress) -> None:
+        """A line that stays, after a measurement."""
+        self._bar.console.print(
+            f"{progress.stage}: step {progress.step:,}, {progress.samples:,} samples, {progress.seconds / 60:.1f} minutes, "
+            f"loss {self._loss:.3f}, held-out IoU {progress.iou:.3f}"
+        )
