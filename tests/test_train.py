@@ -18,7 +18,7 @@ import torch
 import sketchcore as sk
 from sketchcore.nets.weights import load_weights
 from sketchcore.train import PRESETS, Run, train
-from sketchcore.train.chains import ChainSource, start_chain
+from sketchcore.train.chains import ChainSource, ChainStage, start_chain
 from sketchcore.train.checkpoint import load_checkpoint
 
 TINY = {"stem": 8, "widths": (16, 16, 16), "blocks": (1, 1, 1), "groups": 2}
@@ -114,6 +114,21 @@ def test_a_killed_run_is_resumed(tmp_path: Path) -> None:
         step = found.progress.step
     [progress] = train(tiny(tmp_path, steps=step + 1), resume=True, quiet=True)
     assert progress.step == step + 1
+
+
+def test_ctrl_c_saves_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    step, calls = ChainStage.step, []
+
+    def interrupted(stage: ChainStage) -> torch.Tensor:
+        calls.append(1)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return step(stage)
+
+    monkeypatch.setattr(ChainStage, "step", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        train(tiny(tmp_path, steps=9), quiet=True)
+    assert load_checkpoint(tmp_path / "compact.checkpoint.safetensors").progress.step == 2
 
 
 def test_a_chain_is_a_function_of_seed_and_index() -> None:

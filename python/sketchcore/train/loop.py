@@ -310,6 +310,6 @@ class _TrainingBar:
     def report(self, progress: Progress) -> None:
         """A line that stays, after a measurement."""
         self._bar.console.print(
-            f"{progress.stage}: step {progress.step:,}, {progress.samples:,} samples, {progress.seconds / 60:.1f} minutes, "
-            f"loss {self._loss:.3f}, held-out IoU {progress.iou:.3f}"
+            f"{progress.stage}: step {progress.step:,}, {progress.samples:,} samples, "
+            f"{progress.seconds / 60:.1f} minutes, loss {self._loss:.3f}, held-out IoU {progress.iou:.3f}"
         )
