@@ -138,7 +138,26 @@ mod tests {
                 buffers.normal[row * 7 + col] = [0.0, 1.0, 0.0];
             }
         }
-        let expected = ["#######", "#..#..#", "#..#..#", "#..#..#", "#..#..#", "#..#..#", "#######"];
+        // The face whose normal points up carries it.
+        let expected = ["#######", "#...#.#", "#...#.#", "#...#.#", "#...#.#", "#...#.#", "#######"];
         assert_eq!(drawn(&buffers, &LineConfig::default()), expected);
+    }
+
+    #[test]
+    fn a_slanted_crease_is_one_pixel_wide_either_way() {
+        for rising in [false, true] {
+            let mut buffers = picture(&["000000000"; 9]);
+            for row in 0..9 {
+                for col in 0..9 {
+                    if (if rising { 8 - row } else { row }) < col {
+                        buffers.normal[row * 9 + col] = [0.0, 1.0, 0.0];
+                    }
+                }
+            }
+            let ink = detect(&buffers, &LineConfig::default());
+            let inner = (1..8).flat_map(|row| (1..8).map(move |col| row * 9 + col));
+            // Not counting the outline: along a diagonal of seven inner rows, one pixel a row.
+            assert_eq!(inner.filter(|&i| ink[i]).count(), 6, "rising: {rising}");
+        }
     }
 }
