@@ -1,6 +1,7 @@
 """Kernels beside what one would otherwise use, on the same data in the same run: `make bench`.
 
-Each group holds ours and a peer; the table's ratio is the figure to quote. `grid_sample` gets its coordinates for free.
+Each group holds ours and a peer; the table's ratio is the figure to quote. `grid_sample` gets its coordinates for free,
+`embedding_bag` its rows and weights.
 """
 
 from __future__ import annotations
@@ -16,6 +17,12 @@ CAMERA = sk.VIEWPOINTS["quarter-037"]
 BATCH = sk.generate(0, 1)
 ROWS = BATCH.packed_shapes[0]
 VOLUME = BATCH.world.astype(np.float32)
+VIEWS = list(sk.VIEWPOINTS.values())[::2][:6]
+CAMERAS = np.stack([view.packed for view in VIEWS])
+FIELDS = _core.evidence_fields(np.stack([_core.draw(ROWS, camera) for camera in CAMERAS]))
+FEATURES = np.random.default_rng(0).standard_normal((65536, 16), np.float32)
+GRADIENT = np.random.default_rng(1).standard_normal((16384, 32), np.float32)
+TAPS = [torch.from_numpy(taps[0].reshape(-1, 8)) for taps in _core.lift_taps(CAMERA.packed[None])]
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -44,6 +51,11 @@ def numpy_voxels(rows: np.ndarray) -> np.ndarray:
     return grid
 
 
+def embedding_bag(features: torch.Tensor) -> torch.Tensor:
+    rows, weights = TAPS
+    return torch.nn.functional.embedding_bag(rows, features, per_sample_weights=weights, mode="sum")
+
+
 @pytest.mark.benchmark(group="shape -> world voxels")
 def test_voxelize(benchmark):
     np.testing.assert_array_equal(benchmark(_core.voxelize, ROWS), numpy_voxels(ROWS))
@@ -69,6 +81,57 @@ def test_to_camera_grid_torch(benchmark):
     volume = torch.from_numpy(VOLUME)[None]
     made = benchmark(torch.nn.functional.grid_sample, volume, grid, align_corners=False)
     np.testing.assert_allclose(made[0, 0].numpy(), _core.to_camera_grid(VOLUME, CAMERA.packed[None])[0], atol=1e-4)
+
+
+@pytest.mark.benchmark(group="six drawings -> evidence")
+def test_evidence(benchmark):
+    benchmark(_core.evidence, FIELDS, CAMERAS)
+
+
+@pytest.mark.benchmark(group="six drawings -> evidence")
+def test_evidence_torch(benchmark):
+    at = (np.arange(64) + 0.5) / 64 - 0.5
+    voxels = np.stack(np.meshgrid(at, at, at[32:], indexing="ij"), axis=-1)
+    grids = []
+    for camera in VIEWS:
+        for side in (1, -1):
+            p = (voxels * [1, 1, side] - camera.position) @ camera.rotation.T
+            grids.append(p[..., :2] / p[..., 2:] / np.tan(np.radians(camera.fov_degrees / 2)))
+    grid = torch.from_numpy(np.stack(grids).astype(np.float32).reshape(12, 64, -1, 2))
+    fields = torch.from_numpy(FIELDS).permute(0, 3, 1, 2).repeat_interleave(2, 0).float()
+
+    def gather():
+        seen = torch.nn.functional.grid_sample(fields, grid, mode="nearest", align_corners=False)
+        return torch.stack([seen[:, 0].amin(0), seen[:, 1].mean(0), seen[:, 1].amin(0)]).add(0.5).byte()
+
+    made = benchmark(gather).numpy().reshape(3, 64, 64, 32)
+    assert (made == _core.evidence(FIELDS, CAMERAS)).mean() > 0.999
+
+
+@pytest.mark.benchmark(group="image features -> world grid")
+def test_lift(benchmark):
+    benchmark(_core.lift, FEATURES[None], CAMERA.packed[None])
+
+
+@pytest.mark.benchmark(group="image features -> world grid")
+def test_lift_torch(benchmark):
+    made = benchmark(embedding_bag, torch.from_numpy(FEATURES))
+    ours = _core.lift(FEATURES[None], CAMERA.packed[None])
+    np.testing.assert_allclose(made.numpy().reshape(16384, -1), ours[0], atol=1e-5)
+
+
+@pytest.mark.benchmark(group="image features -> world grid, backwards")
+def test_lift_transposed(benchmark):
+    benchmark(_core.lift_transposed, GRADIENT[None], CAMERA.packed[None])
+
+
+@pytest.mark.benchmark(group="image features -> world grid, backwards")
+def test_lift_transposed_torch(benchmark):
+    features = torch.from_numpy(FEATURES).requires_grad_()
+    read, gradient = embedding_bag(features), torch.from_numpy(GRADIENT).reshape(32768, -1)
+    (made,) = benchmark(torch.autograd.grad, read, features, gradient, retain_graph=True)
+    ours = _core.lift_transposed(GRADIENT[None], CAMERA.packed[None])
+    np.testing.assert_allclose(made.numpy(), ours[0], atol=1e-4)
 
 
 @pytest.mark.benchmark(group="one sample")

@@ -299,18 +299,17 @@ def project(camera, points):
     return (p[..., :2] / (p[..., 2:] * half) + 1) / 2 * IMAGE, p[..., 2]
 
 
-def look_up(image, camera, points, slack, shift=0.0):
+def look_up(image, camera, points, slack):
     """The least and the greatest value (0 beyond the image) of the pixels that a point may fall into.
 
-    They are looked up `shift` pixels to the right and below.
     Points that fall closer than `slack` pixels to the border between pixels may fall to either side.
     """
     at, depths = project(camera, points)
     padded = np.pad(image.astype(np.int16), 1)
     found = []
     for dx, dy in ((-slack, -slack), (-slack, slack), (slack, -slack), (slack, slack)):
-        x = np.clip(np.floor(at[..., 0] + shift + dx), -1, IMAGE).astype(int) + 1
-        y = np.clip(np.floor(at[..., 1] + shift + dy), -1, IMAGE).astype(int) + 1
+        x = np.clip(np.floor(at[..., 0] + dx), -1, IMAGE).astype(int) + 1
+        y = np.clip(np.floor(at[..., 1] + dy), -1, IMAGE).astype(int) + 1
         found.append(np.where(depths > 0, padded[y, x], 0))
     return np.minimum.reduce(found), np.maximum.reduce(found)
 
@@ -329,20 +328,49 @@ def fields(drawing):
     return np.round(np.clip(np.stack([128 + 8 * signed, nearness], axis=-1), 0, 255)).astype(np.uint8)
 
 
-# A cell's own ray ends in the corner of four pixels; the kernel looks this far to the right and below, in pixels.
-EVIDENCE_SHIFT = 0.01
+def half_centers(side):
+    """Centres of the cells at z > 0 of a world grid with `side` cells along x, [side, side, side / 2, 3]."""
+    at = (np.arange(side) + 0.5) / side - 0.5
+    return np.stack(np.meshgrid(at, at, at[side // 2 :], indexing="ij"), axis=-1)
 
 
-def evidence(fields, cameras, target, mirror, slack=2e-3):
-    """Hull and match of every cell of one camera's grid, [2, 64, 64, 64]: the least they may be, and the greatest."""
-    points = cell_centers(cameras[target])
-    hulls, matches = [], []
-    for j, (camera, field) in enumerate(zip(cameras, fields, strict=True)):
-        for side in (1, -1) if mirror else (1,):
-            seen = points * np.array([1, 1, side])
-            hulls.append(look_up(field[..., 0], camera, seen, slack, EVIDENCE_SHIFT))
-            if j != target or side < 0:
-                matches.append(look_up(field[..., 1], camera, seen, slack, EVIDENCE_SHIFT))
-    hull = np.min(hulls, axis=0)
-    match = np.mean(matches, axis=0) if matches else np.zeros_like(hull)
-    return tuple(np.stack([hull[k], match[k]]) for k in (0, 1))
+MIRROR = np.array([1.0, 1.0, -1.0])
+
+
+def evidence(fields, cameras, slack=5e-4):
+    """Hull, mean and least nearness, [3, 64, 64, 32], at z > 0: the least they may be, and the greatest."""
+    seen = [(f, c, half_centers(SIDE) * m) for f, c in zip(fields, cameras, strict=True) for m in (1, MIRROR)]
+    signed, nearness = (np.array([look_up(f[..., k], c, points, slack) for f, c, points in seen]) for k in (0, 1))
+    bounds = np.stack([signed.min(axis=0), nearness.mean(axis=0), nearness.min(axis=0)], axis=1)
+    return bounds[0], bounds[1]
+
+
+# --- feature volumes ---------------------------------------------------------------------------------------------
+
+PLANE = 64
+BINS = 16
+COARSE = 32
+
+
+def feature_places(camera, points):
+    """Where points lie in the feature volume, [..., 3]: row, column, bin, with centres at whole numbers.
+
+    Depth stays within the outermost bins' centres. What is behind the eye has no place: NaN.
+    """
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        at, depths = project(camera, points)
+    col, row = (at[..., k] * PLANE / IMAGE - 0.5 for k in (0, 1))
+    bin_ = (depths - camera.near) / (camera.far - camera.near) * BINS - 0.5
+    places = np.stack([row, col, np.clip(bin_, 0, BINS - 1)], axis=-1)
+    return np.where(depths[..., None] > 0, places, np.nan)
+
+
+def lift(features, camera):
+    """Features [65536, width] as the cells at z > 0 read them: own place, then mirror image's; [16384, 2 * width]."""
+    volume = features.reshape(PLANE, PLANE, BINS, -1)
+    readings = []
+    for side in (1, MIRROR):
+        at = feature_places(camera, half_centers(COARSE) * side)
+        at = np.clip(np.where(np.isnan(at), -2, at), -2, PLANE + 2)
+        readings += [_trilinear(volume[..., k], at).ravel() for k in range(volume.shape[-1])]
+    return np.stack(readings, axis=-1)

@@ -46,10 +46,12 @@ def test_axes_of_front_and_top():
     np.testing.assert_allclose(VIEWPOINTS["top"].rotation, [[1, 0, 0], [0, 0, 1], [0, -1, 0]], atol=1e-12)
 
 
-def test_the_core_has_the_same_viewpoints():
-    rows = _core.viewpoints()
-    assert rows.shape == (13, 15)
-    np.testing.assert_allclose(rows, [camera.packed for camera in VIEWPOINTS.values()], rtol=0, atol=1e-12)
+def test_orbit_comes_by_the_viewpoints():
+    quarters = (37.5, 52.5, 127.5, 142.5, 217.5, 232.5, 307.5, 322.5)
+    orbits = [Camera.orbit(azimuth, 38.0) for azimuth in quarters]
+    orbits += [Camera.orbit(azimuth, 0.0) for azimuth in (0.0, 90.0, 180.0, 270.0)] + [Camera.orbit(0.0, 90.0)]
+    packed = [camera.packed for camera in VIEWPOINTS.values()]
+    np.testing.assert_allclose(packed, pack_cameras(orbits), rtol=0, atol=1e-12)
 
 
 @given(reference.cameras())

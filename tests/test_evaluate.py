@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 
 import sketchcore as sk
 from sketchcore.evaluate import evaluate
@@ -13,22 +14,26 @@ from sketchcore.evaluate.measure import Figure
 from sketchcore.evaluate.outline import outline_iou, pieces
 from sketchcore.evaluate.present import as_table, save_plot
 from sketchcore.evaluate.testset import Example, load_testset
-from sketchcore.nets.models import Sketches
+from sketchcore.nets.sketches import Sketches
+from sketchcore.rounds import Volume, update_rounds
 
 
 class Oracle:
     """Looks the truth up by the camera, which no two examples share."""
 
-    symmetric = False
-    latest_only = False
     device = torch.device("cpu")
 
     def __init__(self, examples: list[Example]) -> None:
         self.truth = {camera.packed.tobytes(): e.frustum(i) for e in examples for i, camera in enumerate(e.cameras)}
 
-    def predict(self, sketches: Sketches, view: int, prior: NDArray[np.float32] | None) -> NDArray[np.float32]:
+    def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         blank = np.full((64, 64, 64), 0.1, np.float32)
-        return self.truth.get(sketches.cameras[view].tobytes(), blank)
+        return update_rounds(
+            lambda view, prior: self.truth.get(sketches.cameras[view].tobytes(), blank),
+            sketches.cameras,
+            iterations,
+            start,
+        )
 
 
 def test_the_test_set_is_what_it_was() -> None:

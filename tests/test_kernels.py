@@ -43,10 +43,17 @@ KERNELS = {
     "silhouettes": (_core.silhouettes, {"drawings": DRAWINGS}),
     "carve": (_core.carve, {"drawings": DRAWINGS, "cameras": CAMERAS}),
     "evidence_fields": (_core.evidence_fields, {"drawings": DRAWINGS}),
-    "evidence": (_core.evidence, {"fields": FIELDS, "cameras": CAMERAS, "target": 0, "mirror": True}),
+    "evidence": (_core.evidence, {"fields": FIELDS, "cameras": CAMERAS}),
+    "lift": (_core.lift, {"features": np.zeros((2, 65536, 2), np.float32), "cameras": CAMERAS}),
+    "lift_transposed": (
+        _core.lift_transposed,
+        {"gradient": np.zeros((2, 16384, 2), np.float32), "cameras": CAMERAS},
+    ),
+    "lift_taps": (_core.lift_taps, {"cameras": CAMERAS}),
 }
 ARRAYS = [(k, a) for k, (_, given) in KERNELS.items() for a, v in given.items() if isinstance(v, np.ndarray)]
-FLOATS = [(k, a) for k, a in ARRAYS if KERNELS[k][1][a].dtype != np.uint8]
+# What networks make is handed on as it is.
+FLOATS = [(k, a) for k, a in ARRAYS if KERNELS[k][1][a].dtype != np.uint8 and a not in ("features", "gradient")]
 
 
 def call(kernel, **changes):
@@ -92,8 +99,9 @@ def test_other_dtypes_are_refused_by_name(kernel, name):
 @pytest.mark.parametrize(("kernel", "name"), ARRAYS)
 def test_other_shapes_are_refused_with_the_right_one(kernel, name):
     array = KERNELS[kernel][1][name]
+    shorter = array[:, :-1] if name == "features" else array[..., :-1]  # features have any width
     with pytest.raises(ValueError, match=rf"{name} must have shape \[.*\], got \["):
-        call(kernel, **{name: np.ascontiguousarray(array[..., :-1])})
+        call(kernel, **{name: np.ascontiguousarray(shorter)})
     with pytest.raises(ValueError, match=rf"{name} must have shape \[.*\], got \["):
         call(kernel, **{name: array[None]})
 
@@ -168,11 +176,11 @@ def test_counts_must_agree():
         ("to_world_grid", {"into": VOLUMES[:1].copy()}),
         ("carve", {"cameras": CAMERAS[:1]}),
         ("evidence", {"fields": FIELDS[:1]}),
+        ("lift", {"features": np.zeros((1, 65536, 2), np.float32)}),
+        ("lift_transposed", {"gradient": np.zeros((1, 16384, 2), np.float32)}),
     ):
         with pytest.raises(ValueError, match=r"one for each of the 2 .*, got 1"):
             call(kernel, **change)
-    with pytest.raises(ValueError, match="target must be below the number of cameras, 2; got 2"):
-        call("evidence", target=2)
 
 
 @pytest.mark.parametrize("name", ["voxelize", "frustum", "buffers", "draw"])

@@ -1,6 +1,8 @@
-"""Consensus, rounds and viewpoint guess, with a model that is known exactly."""
+"""The paper's rounds and the viewpoint guess, with models that are known exactly."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -9,9 +11,8 @@ from numpy.typing import NDArray
 
 import sketchcore as sk
 from sketchcore.camera import pack_cameras
-from sketchcore.consensus import Consensus
-from sketchcore.nets.models import Sketches
-from sketchcore.rounds import update_rounds
+from sketchcore.nets.sketches import Sketches
+from sketchcore.rounds import Volume, update_rounds, visit
 from sketchcore.viewpoint import expected_iou, guess_viewpoint
 
 VIEWS = ["quarter-037", "front", "top"]
@@ -21,86 +22,73 @@ SHAPE = sk.Shape([sk.Cuboid((0, -0.1, 0), (0.3, 0.2, 0.2)), sk.Cylinder((0.1, 0.
 class Scripted:
     """Answers drawing k with a constant volume of value `values[k]`, and keeps a record."""
 
-    symmetric = False
-    latest_only = False
-    device = torch.device("cpu")
-
     def __init__(self, values: list[float]) -> None:
         self.values = values
         self.calls: list[tuple[int, bool]] = []
 
-    def predict(self, sketches: Sketches, view: int, prior: NDArray[np.float32] | None) -> NDArray[np.float32]:
+    def __call__(self, view: int, prior: Volume | None) -> Volume:
         self.calls.append((view, prior is not None))
         return np.full((64, 64, 64), self.values[view], np.float32)
 
 
-class Oracle(Scripted):
+class Oracle:
     """Knows the true camera grid of a drawing that was made from its camera; is unsure of any other."""
 
-    def __init__(self) -> None:
-        super().__init__([])
+    device = torch.device("cpu")
 
-    def predict(self, sketches: Sketches, view: int, prior: NDArray[np.float32] | None) -> NDArray[np.float32]:
+    def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
+        return update_rounds(lambda view, prior: self.answer(sketches, view), sketches.cameras, iterations, start)
+
+    def answer(self, sketches: Sketches, view: int) -> Volume:
         camera = sk.Camera.from_packed(sketches.cameras[view])
         truth = sk.frustum(SHAPE, camera).astype(np.float32) / 255
         same = np.array_equal(sk.draw(SHAPE, camera), sketches.drawings[view])
         return truth if same else 0.6 * truth
 
 
-def sketches(names: list[str]) -> Sketches:
-    cameras = [sk.VIEWPOINTS[name] for name in names]
-    return Sketches(np.stack([sk.draw(SHAPE, camera) for camera in cameras]), pack_cameras(cameras))
+def cameras(names: list[str]) -> NDArray[np.float64]:
+    return pack_cameras([sk.VIEWPOINTS[name] for name in names])
 
 
 def test_the_first_drawing_starts_and_every_round_ends_with_it() -> None:
-    model = Scripted([0.1, 0.2, 0.3])
-    volumes = list(update_rounds(model, sketches(VIEWS), 2))
+    predict = Scripted([0.1, 0.2, 0.3])
+    volumes = list(update_rounds(predict, cameras(VIEWS), 2))
     assert len(volumes) == 3
-    assert [view for view, _ in model.calls] == [0, 1, 2, 0, 1, 2, 0]
-    assert [prior for _, prior in model.calls] == [False] + [True] * 6
+    assert [view for view, _ in predict.calls] == [0, 1, 2, 0, 1, 2, 0]
+    assert [prior for _, prior in predict.calls] == [False] + [True] * 6
 
 
 def test_one_drawing_is_refined_by_itself() -> None:
-    model = Scripted([0.1])
-    assert len(list(update_rounds(model, sketches(VIEWS[:1]), 5))) == 6
-    assert len(model.calls) == 6
+    predict = Scripted([0.1])
+    assert len(list(update_rounds(predict, cameras(VIEWS[:1]), 5))) == 6
+    assert [prior for _, prior in predict.calls] == [False] + [True] * 5
 
 
-def test_consensus_is_the_mean_of_the_latest_of_each_drawing() -> None:
-    consensus = Consensus(symmetric=False)
-    constant = [np.full((64, 64, 64), v, np.float32) for v in (0.2, 0.6, 0.4)]
-    np.testing.assert_allclose(consensus.add(0, constant[0]), 0.2, rtol=1e-6)
-    np.testing.assert_allclose(consensus.add(1, constant[1]), 0.4, rtol=1e-6)
-    np.testing.assert_allclose(consensus.add(0, constant[2]), 0.5, rtol=1e-6)
+def test_a_volume_known_before_is_the_first_prior() -> None:
+    predict = Scripted([0.1])
+    next(update_rounds(predict, cameras(VIEWS[:1]), 0, np.zeros((64, 64, 64), np.float32)))
+    assert predict.calls == [(0, True)]
 
 
-def test_the_papers_rule_keeps_the_latest_alone() -> None:
-    consensus = Consensus(symmetric=False, latest_only=True)
-    consensus.add(0, np.full((64, 64, 64), 0.2, np.float32))
-    np.testing.assert_allclose(consensus.add(1, np.full((64, 64, 64), 0.6, np.float32)), 0.6)
-
-
-def test_a_symmetric_consensus_mirrors_z() -> None:
-    volume = np.random.default_rng(0).random((64, 64, 64), np.float32)
-    made = Consensus(symmetric=True).add(0, volume)
-    np.testing.assert_allclose(made, made[:, :, ::-1])
-    np.testing.assert_allclose(made, (volume + volume[:, :, ::-1]) / 2)
+def test_each_prediction_takes_the_place_of_the_one_before() -> None:
+    first, *_, last = update_rounds(Scripted([0.1, 0.2]), cameras(VIEWS[:2]), 1)
+    assert first[32, 32, 32] == pytest.approx(0.1, abs=1e-5)
+    assert last[32, 32, 32] == pytest.approx(0.1, abs=1e-5)
 
 
 def test_voxels_outside_a_frustum_keep_what_they_had() -> None:
     near = sk.Camera.orbit(0.0, 0.0)
     narrow = sk.Camera(near.position, near.rotation, fov_degrees=10.0)
-    model = Scripted([0.8, 0.2])
-    pair = Sketches(sketches(VIEWS[:2]).drawings, pack_cameras([near, narrow]))
-    _, volume = update_rounds(model, pair, 1)
-    # The narrow camera sees the middle alone: elsewhere its prediction is what the first one left there.
-    assert volume[32, 60, 32] == pytest.approx(0.8, abs=1e-5)
-    assert volume[32, 32, 32] == pytest.approx(0.5, abs=1e-5)
+    seen = visit(Scripted([0.8, 0.2]), pack_cameras([near, narrow]), 1, np.full((64, 64, 64), 0.8, np.float32))
+    assert seen[32, 60, 32] == pytest.approx(0.8, abs=1e-5), "the narrow camera sees the middle alone"
+    assert seen[32, 32, 32] == pytest.approx(0.2, abs=1e-5)
 
 
 def test_an_oracle_reaches_the_ceiling_of_the_grid() -> None:
     truth = sk.voxelize(SHAPE)
-    *_, volume = update_rounds(Oracle(), sketches(VIEWS), 1)
+    views = [sk.VIEWPOINTS[name] for name in VIEWS]
+    sketches = Sketches(np.stack([sk.draw(SHAPE, camera) for camera in views]), cameras(VIEWS))
+    *_, volume = Oracle().rounds(sketches, 1)
     assert sk.iou(volume, truth) > 0.93
 
 

@@ -16,12 +16,15 @@ import pytest
 import torch
 
 import sketchcore as sk
+from sketchcore.nets.compact import CompactNet
+from sketchcore.nets.precision import place
 from sketchcore.nets.weights import load_weights
 from sketchcore.train import PRESETS, Run, train
 from sketchcore.train.chains import ChainSource, ChainStage, start_chain
 from sketchcore.train.checkpoint import load_checkpoint
+from sketchcore.train.optimizers import FilterMuon, make_optimizers
 
-TINY = {"stem": 8, "widths": (16, 16, 16), "blocks": (1, 1, 1), "groups": 2}
+TINY = {"stem": 8, "image": (16, 16, 16), "features": 8, "fused": 8, "world": (8, 16, 16), "groups": 2}
 
 
 def tiny(out: Path, **changes: Any) -> Run:
@@ -33,6 +36,7 @@ def test_the_papers_constants() -> None:
     assert (paper.rate, paper.betas, paper.stages) == (2e-4, (0.5, 0.999), ("single", "updater"))
     assert (paper.weight_decay, paper.warmup, paper.cooldown, paper.average, paper.clip) == (0, 0, 0, 0, 0)
     assert paper.generator == {}
+    assert paper.muon == 0
 
 
 def test_a_short_run_leaves_weights_that_load(tmp_path: Path) -> None:
@@ -57,7 +61,7 @@ def test_resuming_goes_on_where_it_stopped(tmp_path: Path) -> None:
     assert progress.step == after.progress.step == 4
     assert progress.samples > before.progress.samples
     assert progress.seconds > before.progress.seconds
-    assert float(after.moments[0]["step"]) == 4
+    assert float(after.moments[1][0]["step"]) == 4
     assert any(not torch.equal(before.model[k], after.model[k]) for k in before.model)
 
 
@@ -89,10 +93,45 @@ KILLED = """
 import sys
 from pathlib import Path
 from sketchcore.train import Run, train
-tiny = {"stem": 8, "widths": (16, 16, 16), "blocks": (1, 1, 1), "groups": 2}
+tiny = {"stem": 8, "image": (16, 16, 16), "features": 8, "fused": 8, "world": (8, 16, 16), "groups": 2}
 run = Run(Path(sys.argv[1]), steps=10_000, save_every=0.0, options=tiny, changes={"batch": 2})
 train(run, resume=len(sys.argv) > 2, quiet=True)
 """
+
+
+def test_muon_takes_the_matrices_and_adam_the_rest() -> None:
+    net = place(CompactNet(), torch.device("cpu"))
+    muon, adam = make_optimizers(net, PRESETS["compact"])
+    assert isinstance(muon, FilterMuon)
+    by_muon = sum(p.numel() for p in muon.param_groups[0]["params"])
+    by_adam = sum(p.numel() for p in adam.param_groups[0]["params"])
+    assert by_muon + by_adam == sum(p.numel() for p in net.parameters())
+    assert by_muon > 0.97 * (by_muon + by_adam)
+
+
+@pytest.mark.parametrize("layout", [torch.contiguous_format, torch.channels_last])
+def test_a_filter_moves_as_its_matrix_would(layout: torch.memory_format) -> None:
+    torch.manual_seed(0)
+    start, gradient = torch.randn(48, 40, 3, 3), torch.randn(48, 40, 3, 3)
+    kernel = torch.nn.Parameter(start.clone(memory_format=layout))
+    order = (0, 2, 3, 1) if layout == torch.channels_last else (0, 1, 2, 3)
+    matrix = torch.nn.Parameter(start.permute(order).reshape(48, -1).clone())
+    ours = FilterMuon([kernel], lr=0.1, weight_decay=0.02)
+    peer = torch.optim.Muon([matrix], lr=0.1, weight_decay=0.02, adjust_lr_fn="match_rms_adamw")
+    for _ in range(3):
+        kernel.grad, matrix.grad = gradient, gradient.permute(order).reshape(48, -1)
+        ours.step()
+        peer.step()
+    torch.testing.assert_close(kernel.detach().permute(order).reshape(48, -1), matrix.detach())
+    assert (kernel - start).abs().max() > 0.01
+    ours.zero_grad()
+    assert kernel.grad is None
+
+
+def test_a_filter_that_is_a_view_is_refused() -> None:
+    kernel = torch.nn.Parameter(torch.randn(64, 40, 3, 6)[..., ::2])
+    with pytest.raises(ValueError, match="not dense in memory"):
+        FilterMuon([kernel], lr=0.1)
 
 
 def test_a_killed_run_is_resumed(tmp_path: Path) -> None:
@@ -135,10 +174,11 @@ def test_a_chain_is_a_function_of_seed_and_index() -> None:
     preset = PRESETS["compact"]
     one, two = start_chain(preset, 5, 9), start_chain(preset, 5, 9)
     assert one.length == two.length
-    np.testing.assert_array_equal(one.drawings, two.drawings)
-    np.testing.assert_array_equal(one.cameras, two.cameras)
-    counts = {len(start_chain(preset, 5, i).drawings) for i in range(30)}
-    assert counts == {1, 2, 3, 4}
+    np.testing.assert_array_equal(one.sketches.drawings, two.sketches.drawings)
+    np.testing.assert_array_equal(one.sketches.cameras, two.sketches.cameras)
+    chains = [start_chain(preset, 5, i) for i in range(30)]
+    assert {len(c.sketches) for c in chains} == {1, 2, 3, 4}
+    assert {c.length for c in chains} == {1, 2, 3}
 
 
 def test_a_source_goes_through_the_indices_in_order() -> None:
@@ -146,7 +186,7 @@ def test_a_source_goes_through_the_indices_in_order() -> None:
     source = ChainSource(preset, 5, first=7)
     try:
         for index, chain in zip(range(7, 11), source, strict=False):
-            np.testing.assert_array_equal(chain.cameras, start_chain(preset, 5, index).cameras)
+            np.testing.assert_array_equal(chain.sketches.cameras, start_chain(preset, 5, index).sketches.cameras)
     finally:
         source.close()
 
@@ -183,5 +223,5 @@ def test_wrong_runs_say_what_would_be_right(tmp_path: Path) -> None:
 def test_the_config_beside_the_weights_is_json(tmp_path: Path) -> None:
     train(tiny(tmp_path, steps=1), quiet=True)
     config = json.loads((tmp_path / "weights.json").read_text())
-    assert config["training"]["rate"] == PRESETS["compact"].rate
-    assert config["options"]["widths"] == [16, 16, 16]
+    assert config["training"]["muon"] == PRESETS["compact"].muon
+    assert config["options"]["image"] == [16, 16, 16]

@@ -14,7 +14,7 @@ How a shape travels, and where each step lives:
     drawing, camera             a picture as the networks want it, and where it was drawn from
     grids                       voxels, drawings, resampling, carving          (rust/src/voxel.rs ... resample.rs)
     nets                        the paper's networks, and the compact one that ships
-    rounds, consensus           the iterative update over all drawings
+    rounds                      the paper's iterative update over all drawings
     reconstruction              the main verb; viewpoint guesses where a drawing was made from
     volume, mesh                what leaves the package
     train, evaluate, cli        how the weights were made and measured; the command line

@@ -10,6 +10,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sketchcore import _core
+
 FOV_DEGREES = 45.0
 NEAR = 1.25
 FAR = 2.75
@@ -117,19 +119,15 @@ def pack_cameras(cameras: Iterable[Camera]) -> NDArray[np.float64]:
     return np.stack(rows) if rows else np.empty((0, 15))
 
 
-def _viewpoints() -> Mapping[str, Camera]:
-    quarters = (37.5, 52.5, 127.5, 142.5, 217.5, 232.5, 307.5, 322.5)
-    named = {f"quarter-{int(azimuth):03d}": Camera.orbit(azimuth, 38.0) for azimuth in quarters}
-    for name, azimuth in (("front", 0.0), ("right", 90.0), ("back", 180.0), ("left", 270.0)):
-        named[name] = Camera.orbit(azimuth, 0.0)
-    named["top"] = Camera.orbit(0.0, 90.0)
-    return MappingProxyType(named)
+_QUARTERS = tuple(f"quarter-{azimuth:03d}" for azimuth in (37, 52, 127, 142, 217, 232, 307, 322))
+_NAMES = (*_QUARTERS, "front", "right", "back", "left", "top")  # in the order of `rust/src/camera.rs`
 
-
-VIEWPOINTS: Mapping[str, Camera] = _viewpoints()
+VIEWPOINTS: Mapping[str, Camera] = MappingProxyType(
+    dict(zip(_NAMES, map(Camera.from_packed, _core.viewpoints()), strict=True))
+)
 """Name -> camera: eight three-quarter views (the single view's), then front, right, back, left and top."""
 
-QUARTER_VIEWS: tuple[str, ...] = tuple(name for name in VIEWPOINTS if name.startswith("quarter-"))
+QUARTER_VIEWS: tuple[str, ...] = _QUARTERS
 """Names of the eight three-quarter viewpoints that a first drawing is made from."""
 
 

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from sketchcore.camera import VIEWPOINTS, Camera, as_camera, pack_cameras
 from sketchcore.drawing import load_drawing
 from sketchcore.mesh import MESH_SUFFIXES, extract_mesh, save_mesh
-from sketchcore.nets.models import CompactModel, Model, PaperModel, Sketches, build_model
+from sketchcore.nets.models import CompactModel, Model, PaperModel, build_model
+from sketchcore.nets.sketches import Sketches
 from sketchcore.nets.weights import load_weights
-from sketchcore.rounds import Volume, update_rounds
+from sketchcore.rounds import Volume
 from sketchcore.viewpoint import guess_viewpoint
 from sketchcore.volume import load_binvox, load_npz, save_binvox, save_npz
 
@@ -152,8 +153,8 @@ def reconstruct(
 ) -> Reconstruction:
     """Turns one or more line drawings of an object into a solid (paper, section 3).
 
-    The first drawing gives a prediction, each other one updates it, and five rounds over all of them bring them to
-    agree. One drawing alone is refined by its own rounds.
+    All drawings give a first prediction, and further rounds refine it; one drawing alone is refined as well. (The
+    paper's networks take one drawing after the other: the first predicts, each other one updates.)
 
     Args:
         drawings: one drawing or a sequence of them; a drawing is a path, a PIL image, or an array [H, W] or
@@ -204,7 +205,7 @@ def _run(
     before: Volume | None = None
     trace = []
     sketches = Sketches(drawings, pack_cameras(views))
-    for number, volume in enumerate(update_rounds(model, sketches, iterations, start)):
+    for number, volume in enumerate(model.rounds(sketches, iterations, start)):
         if before is not None:
             trace.append(float(np.sqrt(np.mean((volume - before) ** 2))))
         if progress is not None:

@@ -1,53 +1,48 @@
-"""The iterative update: drawing after drawing, round after round (paper, section 3.2)."""
+"""The paper's iterative update: drawing after drawing, round after round (section 3.2)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sketchcore import _core
-from sketchcore.consensus import Consensus
-from sketchcore.nets.models import Model, Sketches
 
 Volume = NDArray[np.float32]
+Predict = Callable[[int, Volume | None], Volume]
 
 
-def update_rounds(model: Model, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
+def update_rounds(
+    predict: Predict, cameras: NDArray[np.float64], iterations: int, start: Volume | None = None
+) -> Iterator[Volume]:
     """Predicts from the first drawing, then visits all drawings `iterations` times: 2, 3, ... n, then 1.
 
     Args:
-        model: the network.
-        sketches: the drawings.
+        predict: called with a drawing's number and the prior, float32 [64, 64, 64] (depth, row, col) in that drawing's
+            camera grid, or None for the first prediction; returns the probability of occupancy in that grid.
+        cameras: float64 [n, 15], packed, one a drawing.
         iterations: rounds, 0 or more.
-        start: float32 [64, 64, 64], a volume known before the first drawing; it counts as one prediction.
+        start: float32 [64, 64, 64], a volume in the world grid known before the first drawing.
 
     Yields:
         float32 [64, 64, 64] (x, y, z), probability of occupancy in the world grid: after the first prediction
-        (round 0), and after each round.
+        (round 0), and after each round. What a camera does not see stays as it was.
     """
-    consensus = Consensus(symmetric=model.symmetric, latest_only=model.latest_only)
-    if start is not None:
-        consensus.add(-1, start)
-    yield visit(model, sketches, 0, consensus)
-    order = [*range(1, len(sketches.drawings)), 0]
+    volume = visit(predict, cameras, 0, start)
+    yield volume
+    order = [*range(1, len(cameras)), 0]
     for _ in range(iterations):
         for view in order:
-            volume = visit(model, sketches, view, consensus)
+            volume = visit(predict, cameras, view, volume)
         yield volume
 
 
-def visit(model: Model, sketches: Sketches, view: int, consensus: Consensus) -> Volume:
-    """One pass: the consensus into the drawing's camera grid, through the network, and back.
-
-    Returns:
-        the new consensus.
-    """
-    camera = sketches.cameras[view : view + 1]
-    world = consensus.volume
-    prior = None if world is None else _core.to_camera_grid(world[None], camera)[0]
-    prediction = model.predict(sketches, view, prior)
-    into = np.zeros((1, 64, 64, 64), np.float32) if world is None else world[None].copy()
-    _core.to_world_grid(prediction[None], camera, into)
-    return consensus.add(view, into[0])
+def visit(predict: Predict, cameras: NDArray[np.float64], view: int, volume: Volume | None) -> Volume:
+    """One pass: the world volume into the drawing's camera grid, through the network, and back."""
+    camera = cameras[view : view + 1]
+    prior = None if volume is None else _core.to_camera_grid(volume[None], camera)[0]
+    prediction = predict(view, prior)
+    into = np.zeros((64, 64, 64), np.float32) if volume is None else volume.copy()
+    _core.to_world_grid(prediction[None], camera, into[None])
+    return into

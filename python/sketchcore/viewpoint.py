@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sketchcore.camera import QUARTER_VIEWS, VIEWPOINTS, pack_cameras
-from sketchcore.nets.models import Model, Sketches
+from sketchcore.nets.models import Model
+from sketchcore.nets.sketches import Sketches
 
 
 def guess_viewpoint(model: Model, drawing: NDArray[np.uint8]) -> list[str]:
@@ -21,7 +22,7 @@ def guess_viewpoint(model: Model, drawing: NDArray[np.uint8]) -> list[str]:
 
     def plausibility(name: str) -> float:
         sketches = Sketches(drawing[None], pack_cameras([VIEWPOINTS[name]]))
-        return expected_iou(model.predict(sketches, 0, None))
+        return expected_iou(next(model.rounds(sketches, 0)))
 
     return sorted(QUARTER_VIEWS, key=plausibility, reverse=True)
 

@@ -1,11 +1,10 @@
-//! What all drawings together say about each cell of one camera's grid.
+//! What all drawings together say about each voxel of the world grid.
 //!
-//! Two volumes, both gathered along the cell's projections into the drawings and, where shapes are known to be
-//! symmetric about z = 0, into the drawings as seen by the mirrored cameras:
+//! Shapes are symmetric about z = 0: the half z > 0 tells all, and each drawing speaks twice about a voxel, at the
+//! projection of its centre and at that of its mirror image.
 //!
 //! * **hull**: the least signed distance to a silhouette's border: inside the visual hull it is positive;
-//! * **match**: how near the other drawings' lines are, on average: where a line of this drawing meets one of
-//!   theirs at the right depth, an edge of the object may be (a plane sweep over drawings).
+//! * **nearness** to lines: its mean, high where lines of all drawings meet (a plane sweep), and its least.
 
 use crate::camera::{Camera, IMAGE};
 use crate::carve::{INK, silhouette};
@@ -16,6 +15,8 @@ use std::sync::LazyLock;
 
 /// Bytes of one drawing's fields: signed silhouette distance and nearness to ink, one pair a pixel.
 pub const FIELDS: usize = 2 * IMAGE * IMAGE;
+/// Voxels along z of the half grid.
+const DEEP: usize = SIDE / 2;
 /// Steps of a byte for one pixel of distance.
 const STEPS: f32 = 8.0;
 
@@ -44,45 +45,44 @@ pub fn fill_fields(drawing: &[u8], out: &mut [u8]) {
     }
 }
 
-/// Gathers the evidence of all drawings for the grid of camera `target`, one of `cameras`.
+/// Gathers the evidence of all drawings for the half z > 0 of the world grid, each drawing read at a voxel's place and
+/// at its mirror image's.
 ///
-/// `fields` holds `FIELDS` bytes a drawing; `out` 2 x 64^3 bytes: hull, then match, each (slice, row, col).
-pub fn gather(fields: &[u8], cameras: &[Camera], target: usize, mirror: bool, out: &mut [u8]) {
+/// `fields` holds `FIELDS` bytes a drawing; `out` takes 3 x 64 x 64 x 32 bytes: hull, mean nearness, least nearness,
+/// each (x, y, z).
+pub fn gather(fields: &[u8], cameras: &[Camera], out: &mut [u8]) {
     assert_eq!(fields.len(), cameras.len() * FIELDS);
-    assert_eq!(out.len(), 2 * CELLS);
-    let (hull, matches) = out.split_at_mut(CELLS);
-    let eye = &cameras[target];
-    let depths: [f32; SIDE] = std::array::from_fn(|k| eye.slice_depth(k) as f32);
-    let at = |i: usize| (2 * i + 1) as f64 / SIDE as f64 - 1.0;
-    let reflections: &[f64] = if mirror { &[1.0, -1.0] } else { &[1.0] };
-    let others = cameras.len() * reflections.len() - 1;
-    let share = 1.0 / others.max(1) as f32;
-    for row in 0..SIDE {
-        for col in 0..SIDE {
-            let direction = eye.ray(at(col), at(row));
-            let mut least = [255u8; SIDE];
-            let mut total = [0u32; SIDE];
-            for (j, (camera, field)) in cameras.iter().zip(fields.chunks_exact(FIELDS)).enumerate() {
-                for &side in reflections {
-                    let flip = DVec3::new(1.0, 1.0, side);
-                    let start = camera.to_camera(eye.position * flip).as_vec3();
-                    let step = camera.to_camera(camera.position + direction * flip).as_vec3();
-                    let own = j == target && side > 0.0;
-                    let pixels = pixels_along(start, step, &depths, camera);
-                    for (k, &pixel) in pixels.iter().enumerate() {
+    assert_eq!(out.len(), 3 * CELLS / 2);
+    let (hull, rest) = out.split_at_mut(CELLS / 2);
+    let (mean, least) = rest.split_at_mut(CELLS / 2);
+    let at = |i: usize| (i as f64 + 0.5) / SIDE as f64 - 0.5;
+    let heights: [f32; DEEP] = std::array::from_fn(|k| at(k + DEEP) as f32);
+    let share = 0.5 / cameras.len().max(1) as f32;
+    for x in 0..SIDE {
+        for y in 0..SIDE {
+            let column = (x * SIDE + y) * DEEP..(x * SIDE + y + 1) * DEEP;
+            let (hull, least) = (&mut hull[column.clone()], &mut least[column.clone()]);
+            hull.fill(255);
+            least.fill(255);
+            let mut total = [0u32; DEEP];
+            let foot = DVec3::new(at(x), at(y), 0.0);
+            for (camera, field) in cameras.iter().zip(fields.chunks_exact(FIELDS)) {
+                let start = camera.to_camera(foot).as_vec3();
+                for side in [1.0, -1.0] {
+                    let step = camera.to_camera(camera.position + side * DVec3::Z).as_vec3();
+                    for (k, &pixel) in pixels_along(start, step, &heights, camera).iter().enumerate() {
                         let (signed, nearness) = match pixel {
                             OUTSIDE => (0, 0),
                             _ => (field[2 * pixel as usize], field[2 * pixel as usize + 1]),
                         };
-                        least[k] = least[k].min(signed);
-                        total[k] += if own { 0 } else { u32::from(nearness) };
+                        hull[k] = hull[k].min(signed);
+                        least[k] = least[k].min(nearness);
+                        total[k] += u32::from(nearness);
                     }
                 }
             }
-            for k in 0..SIDE {
-                let cell = (k * SIDE + row) * SIDE + col;
-                hull[cell] = least[k];
-                matches[cell] = (total[k] as f32 * share).round() as u8;
+            for (m, t) in mean[column].iter_mut().zip(total) {
+                *m = (t as f32 * share).round() as u8;
             }
         }
     }
@@ -90,17 +90,57 @@ pub fn gather(fields: &[u8], cameras: &[Camera], target: usize, mirror: bool, ou
 
 const OUTSIDE: u32 = u32::MAX;
 
-/// The pixel that each point `start + depth * step` (camera coordinates) falls into.
-fn pixels_along(start: Vec3, step: Vec3, depths: &[f32; SIDE], camera: &Camera) -> [u32; SIDE] {
+/// The pixel that each point `start + height * step` (camera coordinates) falls into.
+fn pixels_along(start: Vec3, step: Vec3, heights: &[f32; DEEP], camera: &Camera) -> [u32; DEEP] {
     let half = 0.5 * IMAGE as f32;
     let focal = half / camera.half_image as f32;
-    // A cell's own ray ends in the corner of four pixels: rounding shall not choose between them.
-    let half = half + 0.01;
-    depths.map(|depth| {
-        let p = start + step * depth;
+    heights.map(|height| {
+        let p = start + step * height;
         let scale = focal / p.z;
         let (x, y) = (p.x * scale + half, p.y * scale + half);
         let seen = p.z > 0.0 && x >= 0.0 && y >= 0.0 && x < IMAGE as f32 && y < IMAGE as f32;
         if seen { y as u32 * IMAGE as u32 + x as u32 } else { OUTSIDE }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{DISTANCE, VIEWPOINTS};
+
+    fn gathered(fields: &[u8], cameras: &[Camera]) -> [Vec<u8>; 3] {
+        let mut out = vec![7; 3 * CELLS / 2];
+        gather(fields, cameras, &mut out);
+        std::array::from_fn(|i| out[i * CELLS / 2..(i + 1) * CELLS / 2].to_vec())
+    }
+
+    fn viewpoint(i: usize) -> Camera {
+        Camera::orbit(VIEWPOINTS[i].0, VIEWPOINTS[i].1, 0.0, DISTANCE)
+    }
+
+    #[test]
+    fn hull_and_least_are_the_least_and_the_mean_is_the_mean() {
+        let cameras = [0, 4, 8].map(viewpoint);
+        let fields: Vec<u8> =
+            [[200, 10], [150, 41], [180, 0]].iter().flat_map(|f| f.repeat(FIELDS / 2)).collect();
+        let [hull, mean, least] = gathered(&fields, &cameras);
+        let middle = (SIDE / 2 * SIDE + SIDE / 2) * DEEP;
+        assert_eq!([hull[middle], mean[middle], least[middle]], [150, 17, 0]);
+        // From here the image is 0.84 wide at the voxel nearest to the eye.
+        let close = Camera::orbit(0.0, 0.0, 0.0, 1.5);
+        let border = (63 * SIDE + SIDE / 2) * DEEP + DEEP - 1;
+        assert_eq!(gathered(&fields[..FIELDS], &[close]).map(|v| v[border]), [0; 3], "outside the image");
+    }
+
+    #[test]
+    fn a_voxel_is_read_at_its_own_place_and_at_its_mirror_images() {
+        // Seen along -x, +z is on the left: what lies there is missed by the mirror image, and half the mean is left.
+        let camera = viewpoint(8);
+        let left = |i: usize| i % IMAGE < IMAGE / 2;
+        let fields: Vec<u8> =
+            (0..IMAGE * IMAGE).flat_map(|i| if left(i) { [255, 200] } else { [100, 0] }).collect();
+        let [hull, mean, least] = gathered(&fields, &[camera]);
+        let voxel = (SIDE / 2 * SIDE + SIDE / 2) * DEEP + 4;
+        assert_eq!([hull[voxel], mean[voxel], least[voxel]], [100, 100, 0]);
+    }
 }

@@ -9,7 +9,7 @@
 //! batch: all of these for one sample, and samples side by side
 //!
 //! drawing -> distance -> carve, evidence                     what drawings say about space
-//! resample                                                   world grid <-> camera grid
+//! resample, lift                                             world grid <-> camera grid, <- image features
 //! isosurface                                                 a volume as a camera sees it
 //! mesh                                                       the surface that leaves the package
 //! ```
@@ -26,6 +26,7 @@ pub mod error;
 pub mod evidence;
 pub mod grammar;
 pub mod isosurface;
+pub mod lift;
 pub mod lines;
 pub mod mesh;
 pub mod pen;

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from sketchcore.camera import pack_cameras
 from sketchcore.evaluate.testset import Example, load_testset
 from sketchcore.grids import carve, to_world_grid
-from sketchcore.nets.models import Model, Sketches
-from sketchcore.rounds import update_rounds
+from sketchcore.nets.models import Model
+from sketchcore.nets.sketches import Sketches
 from sketchcore.viewpoint import guess_viewpoint
 from sketchcore.volume import iou
 
@@ -108,10 +108,7 @@ def evaluate(model: Model, shapes: int | None = None, progress: Callable[[int, i
 def _network(model: Model, example: Example) -> list[list[float]]:
     cameras = pack_cameras(example.cameras)
     return [
-        [
-            iou(volume, example.world)
-            for volume in update_rounds(model, Sketches(example.drawings[:n], cameras[:n]), ROUNDS)
-        ]
+        [iou(volume, example.world) for volume in model.rounds(Sketches(example.drawings[:n], cameras[:n]), ROUNDS)]
         for n in range(1, VIEWS + 1)
     ]
 

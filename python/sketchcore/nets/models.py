@@ -1,9 +1,8 @@
-"""Networks ready for use: what the iterative update calls, whichever architecture is behind it."""
+"""Networks ready for use: what a reconstruction calls, whichever architecture is behind it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Iterator
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,106 +10,109 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from sketchcore import _core
-from sketchcore.nets.compact import CompactConfig, CompactNet, compact_inputs
-from sketchcore.nets.precision import autocast, pick_device, place
+from sketchcore.nets.compact import CompactConfig, CompactNet
+from sketchcore.nets.precision import autocast, pick_device, place, unit
+from sketchcore.nets.sketches import Sketches
 from sketchcore.nets.unet import PaperNet
-
-
-@dataclass(frozen=True)
-class Sketches:
-    """The drawings of one object, with their cameras.
-
-    Attributes:
-        drawings: uint8 [n, 256, 256], ink 255 on 0.
-        cameras: float64 [n, 15], packed.
-    """
-
-    drawings: NDArray[np.uint8]
-    cameras: NDArray[np.float64]
-
-    @cached_property
-    def fields(self) -> NDArray[np.uint8]:
-        """uint8 [n, 256, 256, 2]: silhouette and nearness to ink (`rust/src/evidence.rs`)."""
-        return _core.evidence_fields(self.drawings)
+from sketchcore.rounds import Volume, update_rounds
 
 
 class Model(Protocol):
-    """A network, or a pair of them, that predicts one drawing's camera grid.
+    """What turns drawings into a volume, round after round.
 
     Attributes:
-        symmetric: whether its shapes are symmetric about z = 0.
-        latest_only: whether it hands on the latest prediction alone (the paper) or the mean (`Consensus`).
         device: where it computes.
     """
 
-    symmetric: bool
-    latest_only: bool
     device: torch.device
 
-    def predict(self, sketches: Sketches, view: int, prior: NDArray[np.float32] | None) -> NDArray[np.float32]:
-        """float32 [64, 64, 64] (depth, row, col): the probability of occupancy in drawing `view`'s camera grid.
+    def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
+        """Yields float32 [64, 64, 64] (x, y, z), probability of occupancy: the first prediction, then each round's.
 
-        `prior` is of that grid too, or None for the first prediction.
+        `start` is a volume that was known before the first drawing.
         """
         ...
 
 
 class CompactModel:
-    """`CompactNet`, for the first drawing and for every further one."""
+    """`CompactNet`: every round looks at all drawings together, and the rounds take turns at looking in the mirror.
 
-    symmetric = True
-    latest_only = False
+    A shape symmetric about z = 0 has two equal descriptions: its drawings, and the same flipped left to right with the
+    cameras mirrored. The volume is the mean of the latest predictions from both, and each next round's prior.
+    """
 
     def __init__(self, net: CompactNet, device: torch.device) -> None:
         self.net = place(net, device).eval()
         self.device = device
 
+    def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
+        latest: dict[str, Tensor] = {}
+        if start is not None:
+            half = 0.5 * (start + start[:, :, ::-1])[:, :, 32:]
+            latest["start"] = torch.from_numpy(np.ascontiguousarray(half, np.float32)).to(self.device)[None]
+        evidence = unit(sketches.evidence[None], self.device)
+        readings: dict[str, Tensor] = {}
+        for number in range(iterations + 1):
+            side = "mirrored" if number % 2 else "plain"
+            if side not in readings:
+                readings[side] = self._read(sketches if side == "plain" else sketches.mirrored())
+            prior = torch.stack([*latest.values()]).mean(dim=0) if latest else None
+            latest[side] = self._decide(readings[side], evidence, prior, len(sketches))
+            mean = torch.stack([*latest.values()]).mean(dim=0)[0]
+            yield _array(torch.cat([mean.flip(2), mean], dim=2))
+
     @torch.inference_mode()
-    def predict(self, sketches: Sketches, view: int, prior: NDArray[np.float32] | None) -> NDArray[np.float32]:
-        evidence = _core.evidence(sketches.fields, sketches.cameras, view, self.symmetric)
-        one = slice(view, view + 1)
-        inputs = compact_inputs(
-            sketches.drawings[one],
-            sketches.fields[one],
-            evidence[None],
-            np.zeros_like(evidence[:1], np.float32) if prior is None else prior[None],
-            sketches.cameras[one],
-            np.array([len(sketches.drawings)]),
-            np.array([prior is not None]),
-            self.device,
-        )
+    def _read(self, sketches: Sketches) -> Tensor:
         with autocast(self.device):
-            logits = self.net(**inputs)
-        return _array(logits[0].float().sigmoid())
+            return self.net.read(
+                unit(sketches.drawings, self.device),
+                unit(sketches.fields, self.device).permute(0, 3, 1, 2),
+                sketches.cameras,
+                [len(sketches)],
+            )
+
+    @torch.inference_mode()
+    def _decide(self, readings: Tensor, evidence: Tensor, prior: Tensor | None, count: int) -> Tensor:
+        has_prior = torch.full((1,), float(prior is not None), device=self.device)
+        known = torch.zeros_like(evidence[:, 0]) if prior is None else prior
+        with autocast(self.device):
+            logits = self.net.decide(readings, evidence, known, has_prior, [count])
+        return logits.float().sigmoid()
 
 
 class PaperModel:
-    """The paper's single-view network and its updater."""
-
-    symmetric = False
-    latest_only = True
+    """The paper's single-view network and its updater, one drawing after the other (`rounds.py`)."""
 
     def __init__(self, single: PaperNet, updater: PaperNet | None, device: torch.device) -> None:
         self.single = place(single, device).eval()
         self.updater = None if updater is None else place(updater, device).eval()
         self.device = device
 
+    def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
+        return update_rounds(
+            lambda view, prior: self.predict(sketches.drawings[view], prior), sketches.cameras, iterations, start
+        )
+
     @torch.inference_mode()
-    def predict(self, sketches: Sketches, view: int, prior: NDArray[np.float32] | None) -> NDArray[np.float32]:
-        drawing = torch.from_numpy(sketches.drawings[view]).to(self.device).float()[None, None] / 255
+    def predict(self, drawing: NDArray[np.uint8], prior: Volume | None) -> Volume:
+        """Occupancy of one drawing's camera grid, float32 [64, 64, 64] (depth, row, col), given a prior in it or None.
+
+        Raises:
+            ValueError: for a prior, if there is no updater.
+        """
+        image = unit(drawing[None, None], self.device)
         with autocast(self.device):
             if prior is None:
-                logits = self.single(drawing)
+                logits = self.single(image)
             elif self.updater is None:
                 raise ValueError("these weights hold the single-view network alone; train the updater as well")
             else:
-                logits = self.updater(drawing, torch.from_numpy(prior).to(self.device)[None])
+                logits = self.updater(image, torch.from_numpy(prior).to(self.device)[None])
         return _array(PaperNet.probability(logits.float())[0])
 
 
-def _array(tensor: Tensor) -> NDArray[np.float32]:
-    array: NDArray[np.float32] = tensor.contiguous().cpu().numpy()
+def _array(tensor: Tensor) -> Volume:
+    array: Volume = tensor.contiguous().cpu().numpy()
     return array
 
 
@@ -123,16 +125,18 @@ def build_model(
         ValueError: if the config names no known network, or the weights do not fit it.
     """
     chosen = pick_device(device)
-    kind = config.get("network")
+    kind, options = config.get("network"), dict(config.get("options", {}))
     if kind == "compact":
-        options = dict(config.get("options", {}))
         tuples: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in options.items()}
-        net = CompactNet(CompactConfig(**tuples))
+        try:
+            net = CompactNet(CompactConfig(**tuples))
+        except TypeError as error:
+            raise ValueError(f"the config is of another version of the network 'compact': {error}") from error
         _fill(net, state)
         return CompactModel(net, chosen)
     if kind == "paper":
         parts = {name.split(".", 1)[0] for name in state}
-        nets = {part: PaperNet(updater=part == "updater", **config.get("options", {})) for part in sorted(parts)}
+        nets = {part: PaperNet(updater=part == "updater", **options) for part in sorted(parts)}
         if "single" not in nets or not parts <= {"single", "updater"}:
             raise ValueError(f"weights of the network 'paper' hold 'single' and 'updater', got {sorted(parts)}")
         for part, net_ in nets.items():

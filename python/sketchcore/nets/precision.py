@@ -1,11 +1,13 @@
-"""Which device to compute on, and in which precision."""
+"""Which device to compute on, and in which precision and layout."""
 
 from __future__ import annotations
 
 from typing import TypeVar
 
+import numpy as np
 import torch
-from torch import nn
+from numpy.typing import NDArray
+from torch import Tensor, nn
 
 Net = TypeVar("Net", bound=nn.Module)
 
@@ -42,4 +44,15 @@ def autocast(device: torch.device, enabled: bool = True) -> torch.autocast:
 
 def place(net: Net, device: torch.device) -> Net:
     """The network on a device, laid out channels last, which is what convolutions are fastest on."""
-    return net.to(device).to(memory_format=torch.channels_last)
+    net = net.to(device)
+    for module in net.modules():
+        if isinstance(module, nn.Conv3d):
+            module.to(memory_format=torch.channels_last_3d)
+        elif isinstance(module, nn.Conv2d | nn.ConvTranspose2d):
+            module.to(memory_format=torch.channels_last)
+    return net
+
+
+def unit(array: NDArray[np.uint8], device: torch.device) -> Tensor:
+    """Bytes as a float32 tensor in 0..1 on a device."""
+    return torch.from_numpy(np.ascontiguousarray(array)).to(device).float() / 255

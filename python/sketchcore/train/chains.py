@@ -1,66 +1,70 @@
-"""Training the compact network as it will be used: in chains of passes over one shape's drawings.
+"""Training the compact network as it will be used: one shape's drawings, then rounds on its own output.
 
-A chain predicts from its first drawing without a prior, hands the detached result on to the next drawing, and so on,
-over all drawings and then again: every pass both trains the network and makes the next pass's prior, so that the
-network meets its own output at every depth. A batch holds chains at different depths; one that has run its course
-is replaced by a new shape.
+A chain predicts from a shape's drawings without a prior and hands the detached result to its next round, so that the
+network meets its own output. A batch holds chains at different depths; one that has run its course is replaced by a
+new shape.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from queue import Queue
 from threading import Event, Thread
+from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from sketchcore import _core
-from sketchcore.consensus import Consensus
 from sketchcore.datagen.generate import generate
-from sketchcore.nets.compact import CompactConfig, CompactNet, compact_inputs, compact_loss
-from sketchcore.nets.precision import autocast, place
+from sketchcore.nets.compact import CompactConfig, CompactNet
+from sketchcore.nets.precision import autocast, place, unit
+from sketchcore.nets.sketches import Sketches
+from sketchcore.train.loss import occupancy_loss
 from sketchcore.train.presets import Preset
 
 DRAWINGS = (0.4, 0.25, 0.2, 0.15)
 """Shares of the chains with one, two, three and four drawings."""
+PASSES = (0.75, 0.15, 0.1)
+"""Shares of the chains with one, two and three passes."""
 
 
 @dataclass
 class Chain:
-    """One shape on its way: its drawings, what they say, and what was predicted so far."""
+    """One shape on its way: its drawings, its truth, and what was predicted so far.
 
-    drawings: NDArray[np.uint8]
-    fields: NDArray[np.uint8]
-    frusta: NDArray[np.uint8]
-    cameras: NDArray[np.float64]
+    Attributes:
+        sketches: its drawings.
+        truth: uint8 [64, 64, 32], occupancy of the half grid z > 0.
+        length: passes it goes through.
+        depth: passes it went through.
+        prior: float32 [64, 64, 32], the latest prediction; zeros before the first.
+    """
+
+    sketches: Sketches
+    truth: NDArray[np.uint8]
     length: int
-    depth: int = 0
-    consensus: Consensus = field(default_factory=lambda: Consensus(symmetric=True))
-
-    @property
-    def view(self) -> int:
-        """Which drawing is next."""
-        return self.depth % len(self.drawings)
+    depth: int
+    prior: NDArray[np.float32]
 
 
 def start_chain(preset: Preset, seed: int, index: int) -> Chain:
     """Chain number `index` of a seed; how many drawings and passes it has depends on these two alone."""
     random = np.random.default_rng((seed, index))
     views = 1 + int(random.choice(len(DRAWINGS), p=DRAWINGS))
-    length = views + int(random.integers(0, views + 2))
+    length = 1 + int(random.choice(len(PASSES), p=PASSES))
     batch = generate(seed, 1, first=index, views=views, config=preset.generator, threads=1)
-    return Chain(
-        batch.drawings[0],
-        _core.evidence_fields(batch.drawings[0]),
-        batch.frusta[0],
-        batch.packed_cameras[0],
+    chain = Chain(
+        Sketches(batch.drawings[0], batch.packed_cameras[0]),
+        np.ascontiguousarray(batch.world[0, :, :, 32:]),
         length,
+        0,
+        np.zeros((64, 64, 32), np.float32),
     )
+    _ = chain.sketches.evidence  # on the thread that makes the chain
+    return chain
 
 
 class ChainSource:
@@ -113,10 +117,6 @@ class ChainStage:
         self._source = ChainSource(preset, seed, first=samples)
         self._chains = iter(self._source)
         self._batch = [self._next() for _ in range(preset.batch)]
-        # Depths are spread from the start, so that no step trains one depth alone.
-        for i, chain in enumerate(self._batch):
-            chain.length = 1 + i % chain.length
-        self._threads = ThreadPoolExecutor(max_workers=torch.get_num_threads())
 
     def _next(self) -> Chain:
         self.samples += 1
@@ -127,43 +127,30 @@ class ChainStage:
         for i, chain in enumerate(self._batch):
             if chain.depth >= chain.length:
                 self._batch[i] = self._next()
-        chains = self._batch
-        inputs, truth = self._gather(chains)
+        truth = torch.from_numpy(np.stack([c.truth for c in self._batch])).to(self._device).float()
         with autocast(self._device):
-            logits = self.model(**inputs)
-        loss = compact_loss(logits, truth)
-        probability = logits.detach().float().sigmoid().contiguous().cpu().numpy()
-        cameras = np.stack([c.cameras[c.view] for c in chains])
-        world = np.stack([_volume(c) for c in chains])
-        _core.to_world_grid(probability, cameras, world)
-        for chain, prediction in zip(chains, world, strict=True):
-            chain.consensus.add(chain.view, prediction)
+            logits = self.model(**compact_inputs(self._batch, self._device))
+        loss = occupancy_loss(logits, truth)
+        predictions = logits.detach().float().sigmoid().cpu().numpy()
+        for chain, prediction in zip(self._batch, predictions, strict=True):
+            chain.prior = prediction
             chain.depth += 1
         return loss
 
-    def _gather(self, chains: list[Chain]) -> tuple[dict[str, Tensor], Tensor]:
-        evidence = self._threads.map(lambda c: _core.evidence(c.fields, c.cameras, c.view, True), chains)
-        cameras = np.stack([c.cameras[c.view] for c in chains])
-        prior = _core.to_camera_grid(np.stack([_volume(c) for c in chains]), cameras)
-        frusta = np.stack([c.frusta[c.view] for c in chains])
-        inputs = compact_inputs(
-            np.stack([c.drawings[c.view] for c in chains]),
-            np.stack([c.fields[c.view] for c in chains]),
-            np.stack(list(evidence)),
-            prior,
-            cameras,
-            np.array([len(c.drawings) for c in chains]),
-            np.array([c.consensus.volume is not None for c in chains]),
-            self._device,
-        )
-        return inputs, torch.from_numpy(frusta).to(self._device).float() / 255
-
     def close(self) -> None:
-        """Stops the threads."""
+        """Stops the thread."""
         self._source.close()
-        self._threads.shutdown()
 
 
-def _volume(chain: Chain) -> NDArray[np.float32]:
-    volume = chain.consensus.volume
-    return np.zeros((64, 64, 64), np.float32) if volume is None else volume
+def compact_inputs(chains: list[Chain], device: torch.device) -> dict[str, Any]:
+    """The arguments of `CompactNet.forward` for a batch of chains."""
+    sketches = [c.sketches for c in chains]
+    return {
+        "drawings": unit(np.concatenate([s.drawings for s in sketches]), device),
+        "fields": unit(np.concatenate([s.fields for s in sketches]), device).permute(0, 3, 1, 2),
+        "cameras": np.concatenate([s.cameras for s in sketches]),
+        "counts": [len(s) for s in sketches],
+        "evidence": unit(np.stack([s.evidence for s in sketches]), device),
+        "prior": torch.from_numpy(np.stack([c.prior for c in chains])).to(device),
+        "has_prior": torch.tensor([float(c.depth > 0) for c in chains], device=device),
+    }

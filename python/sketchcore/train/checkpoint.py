@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,6 @@ class Progress:
         samples: shapes seen.
         seconds: time spent.
         iou: latest held-out IoU, if it was measured.
-        finished: whether the stage ran to its end.
     """
 
     stage: str
@@ -33,32 +33,32 @@ class Progress:
     samples: int = 0
     seconds: float = 0.0
     iou: float | None = None
-    finished: bool = False
 
 
 def save_checkpoint(
     path: Path,
     model: dict[str, Tensor],
     average: dict[str, Tensor],
-    optimizer: dict[str, Any],
+    moments: Sequence[Mapping[int, Mapping[str, Any]]],
     progress: Progress,
 ) -> None:
-    """Writes weights, their average, the optimiser's moments and the progress, atomically, as safetensors."""
+    """Writes weights, their average, each optimiser's moments and the progress, atomically, as safetensors."""
     tensors = {f"model.{name}": t for name, t in model.items()}
     tensors |= {f"average.{name}": t for name, t in average.items()}
-    for index, moments in optimizer["state"].items():
-        tensors |= {f"optimizer.{index}.{name}": torch.as_tensor(t) for name, t in moments.items()}
+    for number, states in enumerate(moments):
+        for index, state in states.items():
+            tensors |= {f"optimizer.{number}.{index}.{name}": torch.as_tensor(t) for name, t in state.items()}
     stored = {name: t.detach().cpu().contiguous().clone() for name, t in tensors.items()}
     write_atomically(path, save(stored, metadata={"progress": json.dumps(asdict(progress))}))
 
 
 @dataclass
 class Checkpoint:
-    """What `save_checkpoint` wrote: state dictionaries, and the progress."""
+    """What `save_checkpoint` wrote: state dictionaries, moments by optimiser and parameter, and the progress."""
 
     model: dict[str, Tensor]
     average: dict[str, Tensor]
-    moments: dict[int, dict[str, Tensor]]
+    moments: dict[int, dict[int, dict[str, Tensor]]]
     progress: Progress
 
 
@@ -73,15 +73,16 @@ def load_checkpoint(path: Path) -> Checkpoint:
         raise FileNotFoundError(f"no checkpoint at {path}; start without --resume")
     model: dict[str, Tensor] = {}
     average: dict[str, Tensor] = {}
-    moments: dict[int, dict[str, Tensor]] = {}
+    moments: dict[int, dict[int, dict[str, Tensor]]] = {}
     try:
         with safe_open(path, framework="pt") as file:
             progress = Progress(**json.loads(file.metadata()["progress"]))
             for key in file.keys():  # noqa: SIM118, a safetensors file is no mapping
                 kind, name = key.split(".", 1)
                 if kind == "optimizer":
-                    index, moment = name.split(".", 1)
-                    moments.setdefault(int(index), {})[moment] = file.get_tensor(key)
+                    number, index, moment = name.split(".", 2)
+                    of_parameter = moments.setdefault(int(number), {}).setdefault(int(index), {})
+                    of_parameter[moment] = file.get_tensor(key)
                 else:
                     (model if kind == "model" else average)[name] = file.get_tensor(key)
     except (SafetensorError, KeyError, TypeError, ValueError) as error:

@@ -7,24 +7,23 @@ from collections.abc import Sequence
 import numpy as np
 
 from sketchcore.datagen.generate import generate
-from sketchcore.nets.models import Model, Sketches
-from sketchcore.rounds import update_rounds
+from sketchcore.nets.models import Model
+from sketchcore.nets.sketches import Sketches
 from sketchcore.volume import iou
 
 SEED = 2**63
 """Training seeds lie below; held-out shapes have this one."""
 
 
-def heldout_iou(model: Model, views: Sequence[int], shapes: int = 16) -> list[float]:
-    """Mean IoU in the world grid after one round over exact drawings, for each number of views."""
+def heldout_iou(model: Model, views: Sequence[int], rounds: int = 1, shapes: int = 16) -> list[float]:
+    """Mean IoU in the world grid after some rounds over exact drawings, for each number of views."""
     batch = generate(SEED, shapes, views=max(views))
     scores = []
     for count in views:
         each = []
         for i in range(shapes):
             sketches = Sketches(batch.drawings[i, :count], batch.packed_cameras[i, :count])
-            rounds = 0 if count == 1 else 1
-            *_, volume = update_rounds(model, sketches, rounds)
+            *_, volume = model.rounds(sketches, rounds)
             each.append(iou(volume, batch.world[i]))
         scores.append(float(np.mean(each)))
     return scores

@@ -23,6 +23,7 @@ from sketchcore.nets.weights import save_weights
 from sketchcore.train.chains import ChainStage
 from sketchcore.train.checkpoint import Checkpoint, Progress, load_checkpoint, save_checkpoint
 from sketchcore.train.heldout import heldout_iou
+from sketchcore.train.optimizers import make_optimizers
 from sketchcore.train.papertrain import SingleStage, UpdaterStage
 from sketchcore.train.presets import PRESETS, Preset
 
@@ -165,16 +166,14 @@ class _Loop:
         c = self.constants
         if found:
             stage.model.load_state_dict(found.model)
-        self.optimizer = torch.optim.AdamW(
-            stage.model.parameters(), lr=c.rate, betas=c.betas, eps=1e-8, weight_decay=c.weight_decay
-        )
+        self.optimizers = make_optimizers(stage.model, c)
+        self.rates = [optimizer.param_groups[0]["lr"] for optimizer in self.optimizers]
         self.average = copy.deepcopy(stage.model).eval().requires_grad_(False) if c.average else stage.model
         if found:
             if c.average:
                 self.average.load_state_dict(found.average)
-            state = self.optimizer.state_dict()
-            state["state"] = found.moments
-            self.optimizer.load_state_dict(state)
+            for number, optimizer in enumerate(self.optimizers):
+                optimizer.load_state_dict({**optimizer.state_dict(), "state": found.moments.get(number, {})})
 
     def go(self, share: float, quiet: bool) -> Progress:
         """Trains to the end of the stage's share of the run."""
@@ -209,7 +208,6 @@ class _Loop:
                 self._save()
                 raise
             self.progress.iou = self._evaluate()
-            self.progress.finished = True
             self._save()
             bar.report(self.progress)
         return self.progress
@@ -217,14 +215,14 @@ class _Loop:
     def _step(self, part: float) -> float:
         c = self.constants
         self.stage.model.train()
-        rate = c.rate
+        share = 1.0
         if c.warmup:
-            rate *= min(1.0, (self.progress.step + 1) / c.warmup)
+            share *= min(1.0, (self.progress.step + 1) / c.warmup)
         if c.cooldown:
-            rate *= min(1.0, (1 - part) / c.cooldown)
-        for group in self.optimizer.param_groups:
-            group["lr"] = rate
-        self.optimizer.zero_grad(set_to_none=True)
+            share *= min(1.0, (1 - part) / c.cooldown)
+        for optimizer, rate in zip(self.optimizers, self.rates, strict=True):
+            optimizer.param_groups[0]["lr"] = share * rate
+            optimizer.zero_grad()
         loss = self.stage.step()
         value = float(loss.detach())
         if not math.isfinite(value):
@@ -232,7 +230,8 @@ class _Loop:
         loss.backward()  # type: ignore[no-untyped-call]
         if c.clip:
             nn.utils.clip_grad_norm_(self.stage.model.parameters(), c.clip)
-        self.optimizer.step()
+        for optimizer in self.optimizers:
+            optimizer.step()
         if c.average:
             # The average forgets its random beginning faster than it will forget later on.
             decay = min(c.average, (self.progress.step + 1) / (self.progress.step + 10))
@@ -254,11 +253,13 @@ class _Loop:
         single = net if name == "single" else self.trained["single"]
         assert isinstance(single, PaperNet)
         model = PaperModel(single, net if name == "updater" else None, self.device)
-        return heldout_iou(model, views=(1,) if name == "single" else (2,))[0]
+        # The single view alone has nothing to update with.
+        return heldout_iou(model, views=(1,) if name == "single" else (2,), rounds=int(name == "updater"))[0]
 
     def _save(self) -> None:
         average = self.average.state_dict() if self.constants.average else {}
-        save_checkpoint(self.path, self.stage.model.state_dict(), average, self.optimizer.state_dict(), self.progress)
+        moments = [optimizer.state_dict()["state"] for optimizer in self.optimizers]
+        save_checkpoint(self.path, self.stage.model.state_dict(), average, moments, self.progress)
 
 
 def _save_weights(run: Run, trained: dict[str, nn.Module], results: list[Progress]) -> None:

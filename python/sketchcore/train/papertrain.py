@@ -12,8 +12,8 @@ from torch import Tensor
 
 from sketchcore import _core
 from sketchcore.datagen.generate import Batch, generate
-from sketchcore.nets.models import PaperModel, Sketches
-from sketchcore.nets.precision import autocast, place
+from sketchcore.nets.models import PaperModel
+from sketchcore.nets.precision import autocast, place, unit
 from sketchcore.nets.unet import PaperNet, paper_loss
 from sketchcore.train.presets import Preset
 
@@ -62,10 +62,10 @@ class SingleStage:
         """One batch; returns the loss."""
         batch = next(self._batches)
         self.samples += len(batch.world)
-        drawing = _unit(batch.drawings, self._device)
+        drawing = unit(batch.drawings, self._device)
         with autocast(self._device):
             logits = self.model(drawing)
-        return paper_loss(logits.float(), _unit(batch.frusta[:, 0], self._device))
+        return paper_loss(logits.float(), unit(batch.frusta[:, 0], self._device))
 
     def close(self) -> None:
         """Stops the thread."""
@@ -95,15 +95,14 @@ class UpdaterStage:
         batch = next(self._batches)
         self.samples += len(batch.world)
         prior = torch.from_numpy(self._priors(batch)).to(self._device)
-        drawing = _unit(batch.drawings[:, 1:], self._device)
+        drawing = unit(batch.drawings[:, 1:], self._device)
         with autocast(self._device):
             logits = self.model(drawing, prior)
-        return paper_loss(logits.float(), _unit(batch.frusta[:, 1], self._device))
+        return paper_loss(logits.float(), unit(batch.frusta[:, 1], self._device))
 
     def _priors(self, batch: Batch) -> NDArray[np.float32]:
         """The single view's predictions from drawing 0, in the camera grids of drawing 1."""
-        pairs = zip(batch.drawings, batch.packed_cameras, strict=True)
-        predictions = np.stack([self._single.predict(Sketches(d, c), 0, None) for d, c in pairs])
+        predictions = np.stack([self._single.predict(drawings[0], None) for drawings in batch.drawings])
         world = np.zeros_like(predictions)
         _core.to_world_grid(predictions, np.ascontiguousarray(batch.packed_cameras[:, 0]), world)
         return _core.to_camera_grid(world, np.ascontiguousarray(batch.packed_cameras[:, 1]))
@@ -111,7 +110,3 @@ class UpdaterStage:
     def close(self) -> None:
         """Stops the thread."""
         self._source.close()
-
-
-def _unit(array: NDArray[np.uint8], device: torch.device) -> Tensor:
-    return torch.from_numpy(np.ascontiguousarray(array)).to(device).float() / 255

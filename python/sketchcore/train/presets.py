@@ -15,7 +15,8 @@ class Preset:
     Attributes:
         stages: networks trained one after the other, each in an equal part of the time.
         batch: samples a step.
-        rate: learning rate of Adam.
+        rate: learning rate of AdamW.
+        muon: learning rate of Muon for all matrices, which AdamW then leaves alone; 0 for none.
         betas: Adam's decay rates.
         weight_decay: decoupled weight decay.
         warmup: steps over which the rate rises from 0.
@@ -29,6 +30,7 @@ class Preset:
     batch: int
     rate: float
     betas: tuple[float, float]
+    muon: float = 0.0
     weight_decay: float = 0.0
     warmup: int = 0
     cooldown: float = 0.0
@@ -46,8 +48,9 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
             batch=16,
             rate=1e-3,
             betas=(0.9, 0.98),
+            muon=2e-3,
             weight_decay=0.02,
-            warmup=200,
+            warmup=40,
             cooldown=0.3,
             average=0.998,
             clip=1.0,

@@ -1,0 +1,67 @@
+"""What the networks for images and for volumes are made of."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+
+class Block(nn.Module):
+    """Two convolutions of 3 cells a side around a normalisation per sample that a code scales and shifts.
+
+    Args:
+        convolution: `nn.Conv2d` or `nn.Conv3d`.
+        width: channels.
+        groups: groups of the normalisation.
+        code: numbers of the code.
+    """
+
+    def __init__(self, convolution: type[nn.Conv2d] | type[nn.Conv3d], width: int, groups: int, code: int) -> None:
+        super().__init__()
+        self.conv1 = convolution(width, width, 3, padding=1, bias=False)
+        self.norm = nn.GroupNorm(groups, width)
+        self.film = nn.Linear(code, 2 * width)
+        self.conv2 = convolution(width, width, 3, padding=1)
+        for zero in (self.film.weight, self.film.bias, self.conv2.weight):
+            nn.init.zeros_(zero)
+
+    def forward(self, x: Tensor, code: Tensor) -> Tensor:
+        film = self.film(code)
+        scale, shift = film.view(*film.shape, *[1] * (x.dim() - 2)).chunk(2, dim=1)
+        h = self.norm(self.conv1(F.relu(x)))
+        out: Tensor = x + self.conv2(F.relu(h * (1 + scale) + shift))
+        return out
+
+
+class Attention(nn.Module):
+    """Self-attention over all cells of a coarse image or volume.
+
+    Args:
+        width: channels.
+        cells: how many cells there are.
+        heads: attention heads.
+    """
+
+    def __init__(self, width: int, cells: int, heads: int = 8) -> None:
+        super().__init__()
+        self.heads = heads
+        self.norm = nn.LayerNorm(width)
+        self.place = nn.Parameter(0.02 * torch.randn(1, cells, width))
+        self.into = nn.Linear(width, 3 * width)
+        self.out = nn.Linear(width, width)
+        nn.init.zeros_(self.out.weight)
+
+    def forward(self, x: Tensor) -> Tensor:
+        cells = x.flatten(2).transpose(1, 2)
+        batch, count, width = cells.shape
+        parts = self.into(self.norm(cells + self.place)).view(batch, count, 3, self.heads, -1)
+        q, k, v = parts.permute(2, 0, 3, 1, 4)
+        seen = F.scaled_dot_product_attention(q, k, v).transpose(1, 2).reshape(batch, count, width)
+        out: Tensor = x + self.out(seen).transpose(1, 2).reshape(x.shape)
+        return out
+
+
+def twice(x: Tensor) -> Tensor:
+    """Every cell of an image or volume doubled along each side."""
+    return F.interpolate(x, scale_factor=2, mode="nearest")

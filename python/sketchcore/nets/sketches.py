@@ -1,0 +1,51 @@
+"""The drawings of one object with their cameras, and what the kernels make of them for the networks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sketchcore import _core
+
+
+@dataclass(frozen=True)
+class Sketches:
+    """The drawings of one object.
+
+    Attributes:
+        drawings: uint8 [n, 256, 256], ink 255 on 0.
+        cameras: float64 [n, 15], packed.
+    """
+
+    drawings: NDArray[np.uint8]
+    cameras: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.drawings)
+
+    @cached_property
+    def fields(self) -> NDArray[np.uint8]:
+        """uint8 [n, 256, 256, 2]: silhouette and nearness to ink (`rust/src/evidence.rs`)."""
+        return _core.evidence_fields(self.drawings)
+
+    @cached_property
+    def evidence(self) -> NDArray[np.uint8]:
+        """uint8 [3, 64, 64, 32]: what all drawings say about each voxel of the half grid z > 0."""
+        return _core.evidence(self.fields, self.cameras)
+
+    def mirrored(self) -> Sketches:
+        """The same object, symmetric about z = 0, as the mirrored cameras see it: every drawing left to right."""
+        return Sketches(np.ascontiguousarray(self.drawings[:, :, ::-1]), mirror_cameras(self.cameras))
+
+
+def mirror_cameras(cameras: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Packed cameras, float64 [n, 15], mirrored about z = 0; their images are flipped left to right."""
+    mirrored = cameras.copy()
+    mirrored[:, 2] *= -1
+    axes = mirrored[:, 3:12].reshape(-1, 3, 3)
+    axes[:, :, 2] *= -1
+    axes[:, 0] *= -1
+    return mirrored

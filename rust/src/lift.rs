@@ -1,0 +1,187 @@
+//! From image planes to the world: where each cell of a coarse world grid finds its features in a drawing.
+//!
+//! A network describes a drawing by a *feature volume* in its camera's frustum: `PLANE`^2 pixels, `BINS` depths
+//! between near and far. A cell of the world grid reads it at the projection of its centre, linearly between pixels
+//! and depths. Shapes are symmetric about z = 0, so that cells are those of the half z > 0, and each reads twice: at
+//! its own place, and at its mirror image's.
+
+use crate::camera::Camera;
+use glam::DVec3;
+
+/// Pixels along each side of the feature volume.
+pub const PLANE: usize = 64;
+/// Depths of the feature volume.
+pub const BINS: usize = 16;
+/// Entries of the feature volume.
+pub const ENTRIES: usize = PLANE * PLANE * BINS;
+/// Cells along x and y of the half grid; half as many along z.
+pub const COARSE: usize = 32;
+/// Cells of the half grid.
+pub const HALF: usize = COARSE * COARSE * COARSE / 2;
+/// Entries of the feature volume that a cell reads.
+pub const TAPS: usize = 8;
+
+/// Rows (pixel by pixel, depths within) and weights of the entries that one reading combines; weights are 0 outside
+/// the image.
+type Taps = [(usize, f32); TAPS];
+
+/// Reads a feature volume, `PLANE`^2 x `BINS` x `width`, at every cell: `HALF` x 2 x `width`, own place then
+/// mirror image.
+pub fn read(camera: &Camera, features: &[f32], width: usize, out: &mut [f32]) {
+    assert_eq!(features.len(), ENTRIES * width);
+    assert_eq!(out.len(), 2 * HALF * width);
+    for_each_reading(camera, |reading, taps| {
+        let out = &mut out[reading * width..][..width];
+        out.fill(0.0);
+        for (row, weight) in taps {
+            let feature = &features[row * width..][..width];
+            out.iter_mut().zip(feature).for_each(|(o, f)| *o += weight * f);
+        }
+    });
+}
+
+/// The transpose of `read`: adds every cell's gradient to the entries that it was read from.
+pub fn read_transposed(camera: &Camera, gradient: &[f32], width: usize, out: &mut [f32]) {
+    assert_eq!(out.len(), ENTRIES * width);
+    assert_eq!(gradient.len(), 2 * HALF * width);
+    for_each_reading(camera, |reading, taps| {
+        let gradient = &gradient[reading * width..][..width];
+        for (row, weight) in taps {
+            let out = &mut out[row * width..][..width];
+            out.iter_mut().zip(gradient).for_each(|(o, g)| *o += weight * g);
+        }
+    });
+}
+
+/// Rows and weights of all readings, for devices that gather by themselves.
+pub fn fill_taps(camera: &Camera, rows: &mut [i32], weights: &mut [f32]) {
+    assert_eq!(rows.len(), 2 * HALF * TAPS);
+    assert_eq!(weights.len(), rows.len());
+    for_each_reading(camera, |reading, taps| {
+        for (i, (row, weight)) in taps.into_iter().enumerate() {
+            rows[reading * TAPS + i] = row as i32;
+            weights[reading * TAPS + i] = weight;
+        }
+    });
+}
+
+fn for_each_reading(camera: &Camera, mut visit: impl FnMut(usize, Taps)) {
+    let at = |i: usize| (i as f64 + 0.5) / COARSE as f64 - 0.5;
+    let mut reading = 0;
+    for x in 0..COARSE {
+        for y in 0..COARSE {
+            for z in COARSE / 2..COARSE {
+                for side in [1.0, -1.0] {
+                    visit(reading, taps(camera, DVec3::new(at(x), at(y), side * at(z))));
+                    reading += 1;
+                }
+            }
+        }
+    }
+}
+
+fn taps(camera: &Camera, point: DVec3) -> Taps {
+    let p = camera.to_camera(point);
+    if p.z <= 0.0 {
+        return [(0, 0.0); TAPS];
+    }
+    let pixel = |q: f64| (q / (p.z * camera.half_image) + 1.0) * (0.5 * PLANE as f64) - 0.5;
+    let depth = (p.z - camera.near) / (camera.far - camera.near) * BINS as f64 - 0.5;
+    let (x, y, d) = (pixel(p.x), pixel(p.y), depth.clamp(0.0, (BINS - 1) as f64));
+    let (x0, y0, d0) = (x.floor(), y.floor(), d.floor().min((BINS - 2) as f64));
+    std::array::from_fn(|i| {
+        let (px, py, pd) = (x0 + (i >> 1 & 1) as f64, y0 + (i >> 2) as f64, d0 + (i & 1) as f64);
+        let side = 0.0..PLANE as f64;
+        if !(side.contains(&px) && side.contains(&py)) {
+            return (0, 0.0);
+        }
+        let share = |t: f64, q: f64| 1.0 - (t - q).abs();
+        let row = (py as usize * PLANE + px as usize) * BINS + pd as usize;
+        (row, (share(x, px) * share(y, py) * share(d, pd)) as f32)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{DISTANCE, VIEWPOINTS};
+
+    /// A volume whose entries are `value(row of the image, column, depth)`.
+    fn volume(value: impl Fn(f64, f64, f64) -> f64) -> Vec<f32> {
+        let at = |i: usize| {
+            value((i / (PLANE * BINS)) as f64, (i / BINS % PLANE) as f64, (i % BINS) as f64) as f32
+        };
+        (0..ENTRIES).map(at).collect()
+    }
+
+    /// Own and mirrored reading of the cell (x, y, z) of the half grid.
+    fn reading(camera: &Camera, features: &[f32], [x, y, z]: [usize; 3]) -> [f32; 2] {
+        let mut out = vec![9.0; 2 * HALF];
+        read(camera, features, 1, &mut out);
+        out.as_chunks().0[(x * COARSE + y) * COARSE / 2 + z]
+    }
+
+    #[test]
+    fn a_cell_is_read_at_its_projection_and_at_its_mirror_images() {
+        let camera = Camera::orbit(0.0, 0.0, 0.0, DISTANCE);
+        // Seen along -x from (2, 0, 0): right is -z, down is -y. The cell is centred on (5, 3, 7) / 64.
+        let (x, y, z) = (5.0 / 64.0, 3.0 / 64.0, 7.0 / 64.0);
+        let focal = 0.5 * PLANE as f64 / camera.half_image / (DISTANCE - x);
+        let cell = [18, 17, 3];
+        let rows = reading(&camera, &volume(|row, _, _| row), cell);
+        let cols = reading(&camera, &volume(|_, col, _| col), cell);
+        let depths = reading(&camera, &volume(|_, _, depth| depth), cell);
+        let expected = [
+            [31.5 - y * focal; 2],
+            [31.5 - z * focal, 31.5 + z * focal],
+            [(DISTANCE - x - camera.near) / (camera.far - camera.near) * BINS as f64 - 0.5; 2],
+        ];
+        for (got, expected) in [rows, cols, depths].as_flattened().iter().zip(expected.as_flattened()) {
+            assert!((f64::from(*got) - expected).abs() < 1e-4, "{got} {expected}");
+        }
+    }
+
+    #[test]
+    fn depths_beyond_the_outermost_are_read_there_and_nothing_is_behind_the_eye() {
+        let depths = volume(|_, _, depth| depth + 1.0);
+        let middle = [COARSE / 2, COARSE / 2, 0];
+        let camera = Camera::orbit(0.0, 0.0, 0.0, DISTANCE);
+        let at = |near: f64, far: f64| reading(&Camera { near, far, ..camera }, &depths, middle);
+        assert!(at(3.0, 4.0).iter().all(|v| (v - 1.0).abs() < 1e-6));
+        assert!(at(0.5, 1.0).iter().all(|v| (v - BINS as f32).abs() < 1e-5));
+        let beyond = Camera { position: -camera.position, ..camera };
+        assert_eq!(reading(&beyond, &depths, middle), [0.0; 2]);
+    }
+
+    #[test]
+    fn the_transpose_of_reading_is_its_transpose() {
+        let wave = |n: usize, pace: f64| (0..n).map(|i| (i as f64 * pace).sin() as f32).collect::<Vec<_>>();
+        let (features, gradient) = (wave(2 * ENTRIES, 0.7), wave(4 * HALF, 1.3));
+        let dot = |a: &[f32], b: &[f32]| -> f64 {
+            a.iter().zip(b).map(|(&a, &b)| f64::from(a) * f64::from(b)).sum()
+        };
+        for (azimuth, elevation) in VIEWPOINTS {
+            let camera = Camera::orbit(azimuth, elevation, 0.1, DISTANCE);
+            let (mut there, mut back) = (vec![0.0; 4 * HALF], vec![0.0; 2 * ENTRIES]);
+            read(&camera, &features, 2, &mut there);
+            read_transposed(&camera, &gradient, 2, &mut back);
+            let (a, b) = (dot(&there, &gradient), dot(&features, &back));
+            assert!((a - b).abs() < 1e-2, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn taps_are_what_reading_combines() {
+        let camera = Camera::orbit(37.5, 38.0, 0.0, DISTANCE);
+        let (mut rows, mut weights) = (vec![-1; 2 * HALF * TAPS], vec![-1.0; 2 * HALF * TAPS]);
+        fill_taps(&camera, &mut rows, &mut weights);
+        let features = volume(|row, col, depth| (row * 0.9 + col * 0.4 + depth).sin());
+        let mut out = vec![0.0; 2 * HALF];
+        read(&camera, &features, 1, &mut out);
+        let taps = rows.as_chunks::<TAPS>().0.iter().zip(weights.as_chunks::<TAPS>().0);
+        for ((rows, weights), got) in taps.zip(out) {
+            let sum: f32 = rows.iter().zip(weights).map(|(&r, w)| w * features[r as usize]).sum();
+            assert_eq!(sum, got);
+        }
+    }
+}

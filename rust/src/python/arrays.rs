@@ -1,0 +1,107 @@
+//! Arrays and numbers from Python: checked, and packed again on the way back.
+
+use crate::camera::{Camera, IMAGE, PACKED};
+use crate::csg::Shape;
+use crate::error::CoreError;
+use crate::voxel::SIDE;
+use numpy::{
+    Element, IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn,
+    PyUntypedArrayMethods,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+pub const GRIDS: [isize; 4] = [-1, SIDE as isize, SIDE as isize, SIDE as isize];
+pub const DRAWINGS: [isize; 3] = [-1, IMAGE as isize, IMAGE as isize];
+
+/// A contiguous array's numbers, if its shape is as given; -1 stands for any length.
+pub fn checked<'a, T: Element>(
+    array: &'a PyReadonlyArrayDyn<'_, T>,
+    what: &'static str,
+    shape: &[isize],
+) -> PyResult<&'a [T]> {
+    check_shape(array.shape(), what, shape)?;
+    // `as_slice` alone would take Fortran order as well.
+    if !array.is_c_contiguous() {
+        return Err(not_contiguous(what));
+    }
+    array.as_slice().map_err(|_| not_contiguous(what))
+}
+
+pub fn checked_mut<'a, T: Element>(
+    array: &'a mut PyReadwriteArrayDyn<'_, T>,
+    what: &'static str,
+    shape: &[isize],
+) -> PyResult<&'a mut [T]> {
+    check_shape(array.shape(), what, shape)?;
+    if !array.is_c_contiguous() {
+        return Err(not_contiguous(what));
+    }
+    array.as_slice_mut().map_err(|_| not_contiguous(what))
+}
+
+fn check_shape(got: &[usize], what: &'static str, shape: &[isize]) -> Result<(), CoreError> {
+    let fits = |(&g, &s): (&usize, &isize)| s < 0 || g == s as usize;
+    if got.len() == shape.len() && got.iter().zip(shape).all(fits) {
+        return Ok(());
+    }
+    let names = shape.iter().map(|&s| if s < 0 { "n".into() } else { s.to_string() });
+    Err(CoreError::WrongShape {
+        what,
+        expected: format!("[{}]", names.collect::<Vec<_>>().join(", ")),
+        got: format!("{got:?}"),
+    })
+}
+
+fn not_contiguous(what: &str) -> PyErr {
+    PyValueError::new_err(format!("{what} must be C-contiguous; numpy.ascontiguousarray makes it so"))
+}
+
+pub fn same_count(what: &'static str, got: usize, expected: usize) -> Result<(), CoreError> {
+    if got == expected {
+        return Ok(());
+    }
+    Err(CoreError::WrongShape {
+        what,
+        expected: format!("one for each of the {expected} others"),
+        got: got.to_string(),
+    })
+}
+
+pub fn all_finite(values: &[f32], what: &'static str) -> Result<(), CoreError> {
+    // The sum of absolute values is finite unless an entry is not; and it vectorises.
+    let sum: f64 = values.chunks(4096).map(|c| f64::from(c.iter().map(|v| v * 0.0).sum::<f32>())).sum();
+    if sum == 0.0 { Ok(()) } else { Err(CoreError::NotFinite { what }) }
+}
+
+pub fn check_size(size: i64) -> PyResult<usize> {
+    if (1..=4096).contains(&size) {
+        return Ok(size as usize);
+    }
+    Err(PyValueError::new_err(format!("size must lie between 1 and 4096 pixels, got {size}")))
+}
+
+pub fn shape_of(rows: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Shape> {
+    let rows = checked(rows, "shape", &[-1, 8])?;
+    Ok(Shape::from_rows(rows.as_chunks().0)?)
+}
+
+pub fn cameras_of(rows: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<Camera>> {
+    let rows = checked(rows, "cameras", &[-1, PACKED as isize])?;
+    let cameras = rows.as_chunks::<PACKED>().0.iter().map(Camera::from_packed);
+    Ok(cameras.collect::<Result<_, _>>()?)
+}
+
+pub fn camera_of(row: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Camera> {
+    let row = checked(row, "camera", &[PACKED as isize])?;
+    Ok(Camera::from_packed(&row.as_chunks::<PACKED>().0[0])?)
+}
+
+pub fn grid<'py, T: Element>(
+    py: Python<'py>,
+    data: Vec<T>,
+    lead: &[usize],
+) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
+    let dims = [lead, &[SIDE, SIDE, SIDE]].concat();
+    data.into_pyarray(py).reshape(dims)
+}

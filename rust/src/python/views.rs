@@ -1,0 +1,110 @@
+//! What a camera sees of a shape or of a volume.
+
+use super::arrays::{all_finite, camera_of, check_size, checked, grid, shape_of};
+use crate::buffers::{Buffers, fill_frustum};
+use crate::camera::{Camera, DISTANCE, IMAGE, PACKED, VIEWPOINTS};
+use crate::lines::{LineConfig, detect};
+use crate::voxel::{CELLS, SIDE};
+use numpy::{
+    IntoPyArray, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// The 13 viewpoints, float64 [13, 15].
+#[pyfunction]
+pub fn viewpoints<'py>(py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let orbit = |&(azimuth, elevation): &(f64, f64)| Camera::orbit(azimuth, elevation, 0.0, DISTANCE);
+    let rows: Vec<f64> = VIEWPOINTS.iter().flat_map(|v| orbit(v).to_packed()).collect();
+    rows.into_pyarray(py).reshape([VIEWPOINTS.len(), PACKED])
+}
+
+#[pyfunction]
+pub fn frustum<'py>(
+    py: Python<'py>,
+    shape: PyReadonlyArrayDyn<'py, f64>,
+    camera: PyReadonlyArrayDyn<'py, f64>,
+    rays: i64,
+) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
+    let (shape, camera) = (shape_of(&shape)?, camera_of(&camera)?);
+    if !(1..=16).contains(&rays) {
+        return Err(PyValueError::new_err(format!("rays must lie between 1 and 16, got {rays}")));
+    }
+    let rays = rays as usize;
+    let mut cells = vec![0; CELLS];
+    py.detach(|| fill_frustum(&shape, &camera, rays, &mut cells))?;
+    grid(py, cells, &[])
+}
+
+type BufferArrays<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray3<f32>>);
+
+#[pyfunction]
+pub fn buffers<'py>(
+    py: Python<'py>,
+    shape: PyReadonlyArrayDyn<'py, f64>,
+    camera: PyReadonlyArrayDyn<'py, f64>,
+    size: i64,
+) -> PyResult<BufferArrays<'py>> {
+    let (shape, camera) = (shape_of(&shape)?, camera_of(&camera)?);
+    let size = check_size(size)?;
+    buffer_arrays(py, py.detach(|| Buffers::of_shape(&shape, &camera, size))?)
+}
+
+#[pyfunction]
+pub fn isosurface<'py>(
+    py: Python<'py>,
+    volume: PyReadonlyArrayDyn<'py, f32>,
+    level: f32,
+    camera: PyReadonlyArrayDyn<'py, f64>,
+    size: i64,
+) -> PyResult<BufferArrays<'py>> {
+    let camera = camera_of(&camera)?;
+    let volume = checked(&volume, "volume", &[SIDE as isize; 3])?;
+    all_finite(volume, "volume")?;
+    let size = check_size(size)?;
+    buffer_arrays(py, py.detach(|| crate::isosurface::cast(volume, level, &camera, size)))
+}
+
+fn buffer_arrays<'py>(py: Python<'py>, made: Buffers) -> PyResult<BufferArrays<'py>> {
+    let size = made.size;
+    let depth = made.depth.into_pyarray(py).reshape([size, size])?;
+    let normal = made.normal.into_flattened().into_pyarray(py).reshape([size, size, 3])?;
+    Ok((depth, normal))
+}
+
+#[pyfunction]
+pub fn lines<'py>(
+    py: Python<'py>,
+    depth: PyReadonlyArrayDyn<'py, f32>,
+    normal: PyReadonlyArrayDyn<'py, f32>,
+    depth_step: f32,
+    crease_degrees: f32,
+) -> PyResult<Bound<'py, PyArray2<u8>>> {
+    let size = check_size(depth.shape().first().map_or(0, |&s| s as i64))?;
+    let side = size as isize;
+    let depth = checked(&depth, "depth", &[side, side])?.to_vec();
+    let normal = checked(&normal, "normal", &[side, side, 3])?.as_chunks::<3>().0.to_vec();
+    all_finite(normal.as_flattened(), "normal")?;
+    if depth.iter().any(|d| d.is_nan() || *d <= 0.0) {
+        let message = "depth must be more than 0 everywhere, infinite where nothing is seen";
+        return Err(PyValueError::new_err(message));
+    }
+    let made = Buffers { depth, normal, size };
+    let config = LineConfig { depth_step, crease_degrees };
+    config.check()?;
+    let ink = py.detach(|| detect(&made, &config));
+    let bytes: Vec<u8> = ink.iter().map(|&i| if i { 255 } else { 0 }).collect();
+    bytes.into_pyarray(py).reshape([size, size])
+}
+
+#[pyfunction]
+pub fn draw<'py>(
+    py: Python<'py>,
+    shape: PyReadonlyArrayDyn<'py, f64>,
+    camera: PyReadonlyArrayDyn<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<u8>>> {
+    let (shape, camera) = (shape_of(&shape)?, camera_of(&camera)?);
+    let mut drawing = vec![0; IMAGE * IMAGE];
+    py.detach(|| crate::batch::draw(&shape, &camera, &LineConfig::default(), &mut drawing))?;
+    drawing.into_pyarray(py).reshape([IMAGE, IMAGE])
+}
