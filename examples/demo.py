@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import sketchcore as sk
-from sketchcore.evaluate.outline import outline_iou, pieces
+from sketchcore.outline import outline_iou, pieces
 from sketchcore.picture import save_picture
 
 HERE = Path(__file__).parent
@@ -25,7 +25,8 @@ def main() -> None:
         path = OUT / f"{example['name']}.glb"
         solid.save(path)
         save_picture(solid, path.with_suffix(".png"))
-        overlaps = ", ".join(f"{overlap:.2f}" for overlap in outline_iou(solid))
+        seen = zip(solid.views, solid.drawings, strict=True)
+        overlaps = ", ".join(f"{outline_iou(solid.probability, *pair):.2f}" for pair in seen)
         print(
             f"{path.relative_to(HERE.parent)} and .png: {seconds:.1f} s, pieces: {len(pieces(solid.probability))}, "
             f"outline overlap with each drawing: {overlaps}"

@@ -13,7 +13,7 @@ import sketchcore as sk
 from sketchcore.camera import pack_cameras
 from sketchcore.nets.sketches import Sketches
 from sketchcore.rounds import Volume, update_rounds, visit
-from sketchcore.viewpoint import expected_iou, guess_viewpoint
+from sketchcore.viewpoint import guess_viewpoint
 
 VIEWS = ["quarter-037", "front", "top"]
 SHAPE = sk.Shape([sk.Cuboid((0, -0.1, 0), (0.3, 0.2, 0.2)), sk.Cylinder((0.1, 0.15, 0), (0.1, 0.1, 0.1))])
@@ -95,9 +95,3 @@ def test_an_oracle_reaches_the_ceiling_of_the_grid() -> None:
 def test_the_viewpoint_of_an_oracle_is_found() -> None:
     for name in sk.QUARTER_VIEWS:
         assert guess_viewpoint(Oracle(), sk.draw(SHAPE, sk.VIEWPOINTS[name]))[0] == name
-
-
-def test_expected_iou() -> None:
-    assert expected_iou(np.zeros((4, 4, 4), np.float32)) == 0.0
-    assert expected_iou(np.ones((4, 4, 4), np.float32)) == 1.0
-    assert expected_iou(np.array([0.8, 0.4], np.float32)) == pytest.approx(0.8 / 1.4)

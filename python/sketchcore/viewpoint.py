@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 from sketchcore.camera import QUARTER_VIEWS, VIEWPOINTS, pack_cameras
 from sketchcore.nets.models import Model
 from sketchcore.nets.sketches import Sketches
+from sketchcore.outline import outline_iou
 
 
 def guess_viewpoint(model: Model, drawing: NDArray[np.uint8]) -> list[str]:
     """The names of the eight three-quarter viewpoints, most plausible first.
 
-    A viewpoint is as plausible as the network's first prediction from it is sure of itself.
+    A viewpoint is as plausible as the solid that is predicted from it fills the drawing's outline when seen from it.
 
     Args:
         model: the network.
@@ -21,15 +22,8 @@ def guess_viewpoint(model: Model, drawing: NDArray[np.uint8]) -> list[str]:
     """
 
     def plausibility(name: str) -> float:
-        sketches = Sketches(drawing[None], pack_cameras([VIEWPOINTS[name]]))
-        return expected_iou(next(model.rounds(sketches, 0)))
+        camera = VIEWPOINTS[name]
+        volume = next(model.rounds(Sketches(drawing[None], pack_cameras([camera])), 0))
+        return outline_iou(volume, camera, drawing)
 
     return sorted(QUARTER_VIEWS, key=plausibility, reverse=True)
-
-
-def expected_iou(probability: NDArray[np.float32]) -> float:
-    """The IoU that a prediction, cut at one half, has by its own account: about E|A and B| / E|A or B|."""
-    inside = probability > 0.5
-    sure = float(probability[inside].sum())
-    either = float(inside.sum()) + float(probability[~inside].sum())
-    return sure / either if either > 0 else 0.0

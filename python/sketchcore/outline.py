@@ -1,4 +1,4 @@
-"""What can be measured of a reconstruction without its truth: outlines against drawings, and pieces."""
+"""How well a solid fills the outline of a drawing: what can be said of a reconstruction without its truth."""
 
 from __future__ import annotations
 
@@ -6,22 +6,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sketchcore import _core
+from sketchcore.camera import Camera
 from sketchcore.grids import silhouette
-from sketchcore.reconstruction import Reconstruction
 
 
-def outline_iou(solid: Reconstruction) -> list[float]:
-    """For each drawing, the IoU of the solid's outline as its camera sees it and the drawing's, filled.
+def outline_iou(probability: NDArray[np.float32], camera: Camera, drawing: NDArray[np.uint8]) -> float:
+    """IoU of the solid's outline, as the camera sees its 0.5 iso-surface, and the drawing's.
 
     Both fill their holes: what the background does not reach from the border counts as inside.
+
+    Args:
+        probability: float32 [64, 64, 64], world grid (x, y, z).
+        camera: the drawing's.
+        drawing: uint8 [256, 256], ink 255 on 0.
     """
-    return [
-        _overlap(_core.isosurface(solid.probability, 0.5, camera.packed, len(drawing))[0], drawing)
-        for drawing, camera in zip(solid.drawings, solid.views, strict=True)
-    ]
-
-
-def _overlap(depth: NDArray[np.float32], drawing: NDArray[np.uint8]) -> float:
+    depth, _ = _core.isosurface(probability, 0.5, camera.packed, len(drawing))
     # As ink, the solid's outline is filled by the same rule as the drawing's.
     seen = silhouette(np.where(np.isfinite(depth), 255, 0).astype(np.uint8)).astype(bool)
     drawn = silhouette(drawing).astype(bool)
