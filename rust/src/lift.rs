@@ -67,12 +67,14 @@ pub fn fill_taps(camera: &Camera, rows: &mut [i32], weights: &mut [f32]) {
 
 fn for_each_reading(camera: &Camera, mut visit: impl FnMut(usize, Taps)) {
     let at = |i: usize| (i as f64 + 0.5) / COARSE as f64 - 0.5;
+    let along_z = camera.to_camera(camera.position + DVec3::Z);
     let mut reading = 0;
     for x in 0..COARSE {
         for y in 0..COARSE {
+            let foot = camera.to_camera(DVec3::new(at(x), at(y), 0.0));
             for z in COARSE / 2..COARSE {
                 for side in [1.0, -1.0] {
-                    visit(reading, taps(camera, DVec3::new(at(x), at(y), side * at(z))));
+                    visit(reading, taps(camera, foot + along_z * (side * at(z))));
                     reading += 1;
                 }
             }
@@ -80,25 +82,33 @@ fn for_each_reading(camera: &Camera, mut visit: impl FnMut(usize, Taps)) {
     }
 }
 
-fn taps(camera: &Camera, point: DVec3) -> Taps {
-    let p = camera.to_camera(point);
+/// The entries around a point in camera coordinates.
+fn taps(camera: &Camera, p: DVec3) -> Taps {
     if p.z <= 0.0 {
         return [(0, 0.0); TAPS];
     }
-    let pixel = |q: f64| (q / (p.z * camera.half_image) + 1.0) * (0.5 * PLANE as f64) - 0.5;
+    let focal = 0.5 * PLANE as f64 / camera.half_image / p.z;
+    let middle = 0.5 * (PLANE - 1) as f64;
     let depth = (p.z - camera.near) / (camera.far - camera.near) * BINS as f64 - 0.5;
-    let (x, y, d) = (pixel(p.x), pixel(p.y), depth.clamp(0.0, (BINS - 1) as f64));
-    let (x0, y0, d0) = (x.floor(), y.floor(), d.floor().min((BINS - 2) as f64));
+    let (col, cols) = pair(p.x * focal + middle, PLANE);
+    let (row, rows) = pair(p.y * focal + middle, PLANE);
+    let (bin, bins) = pair(depth.clamp(0.0, (BINS - 1) as f64), BINS);
     std::array::from_fn(|i| {
-        let (px, py, pd) = (x0 + (i >> 1 & 1) as f64, y0 + (i >> 2) as f64, d0 + (i & 1) as f64);
-        let side = 0.0..PLANE as f64;
-        if !(side.contains(&px) && side.contains(&py)) {
-            return (0, 0.0);
-        }
-        let share = |t: f64, q: f64| 1.0 - (t - q).abs();
-        let row = (py as usize * PLANE + px as usize) * BINS + pd as usize;
-        (row, (share(x, px) * share(y, py) * share(d, pd)) as f32)
+        let (dx, dy, dd) = (i >> 1 & 1, i >> 2, i & 1);
+        (((row[dy] * PLANE) + col[dx]) * BINS + bin[dd], rows[dy] * cols[dx] * bins[dd])
     })
+}
+
+/// The two of `count` places around `at`, and their shares; a place that does not exist has none, and stands for 0.
+fn pair(at: f64, count: usize) -> ([usize; 2], [f32; 2]) {
+    let low = at.floor();
+    let share = at - low;
+    let place = |at: f64, share: f64| {
+        let exists = at >= 0.0 && at < count as f64;
+        if exists { (at as usize, share as f32) } else { (0, 0.0) }
+    };
+    let ((i, a), (j, b)) = (place(low, 1.0 - share), place(low + 1.0, share));
+    ([i, j], [a, b])
 }
 
 #[cfg(test)]
