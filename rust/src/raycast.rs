@@ -11,7 +11,8 @@ use glam::DVec3;
 /// Gaps and slivers shorter than this (world units) are rounding, not geometry.
 const EPSILON: f64 = 1e-9;
 
-/// The face of a primitive: its index, and 0, 1, 2 for a flat face across x, y, z, 3 for the curved one.
+/// The face of a primitive: its index, and 0, 1, 2 for a flat face across x, y, z, 3 for the curved or
+/// slanted one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Face {
     primitive: u32,
@@ -88,6 +89,12 @@ impl<'a> RayCaster<'a> {
                 normal[v] = at[v] / (p.half[v] * p.half[v]);
                 normal = normal.normalize();
             }
+            (3, Kind::Wedge { axis, corner }) => {
+                let (u, v) = cross_axes(axis);
+                normal[u] = f64::from(corner[0]) / p.half[u];
+                normal[v] = f64::from(corner[1]) / p.half[v];
+                normal = normal.normalize();
+            }
             (side, _) => normal[usize::from(side)] = 1.0,
         }
         if normal.dot(direction) > 0.0 { -normal } else { normal }
@@ -118,7 +125,7 @@ fn intersect(
         a < b
     };
     match primitive.kind {
-        Kind::Cuboid => {
+        Kind::Cuboid | Kind::Wedge { .. } => {
             if !(slab(0) && slab(1) && slab(2)) {
                 return None;
             }
@@ -151,6 +158,28 @@ fn intersect(
                 if a >= b {
                     return None;
                 }
+            }
+        }
+    }
+    if let Kind::Wedge { axis, corner } = primitive.kind {
+        let (u, v) = cross_axes(axis);
+        let (nu, nv) = (f64::from(corner[0]) / primitive.half[u], f64::from(corner[1]) / primitive.half[v]);
+        // How far inside the slanted face, at the eye and for each unit of depth.
+        let (within, slope) = (nu * origin[u] + nv * origin[v], nu * direction[u] + nv * direction[v]);
+        if slope == 0.0 {
+            if within < 0.0 {
+                return None;
+            }
+        } else {
+            let t = -within / slope;
+            if slope > 0.0 && t > a {
+                (a, entry) = (t, 3);
+            }
+            if slope < 0.0 && t < b {
+                (b, exit) = (t, 3);
+            }
+            if a >= b {
+                return None;
             }
         }
     }
@@ -223,9 +252,9 @@ mod tests {
 
     fn any_shape() -> impl Strategy<Value = Shape> {
         let triple = |lo: f64, hi: f64| [lo..hi, lo..hi, lo..hi];
-        let primitive = (0..4usize, any::<bool>(), triple(-0.3, 0.3), triple(0.02, 0.25)).prop_map(
+        let primitive = (0..16u8, any::<bool>(), triple(-0.3, 0.3), triple(0.02, 0.25)).prop_map(
             |(kind, additive, center, half)| Primitive {
-                kind: if kind == 0 { Kind::Cuboid } else { Kind::Cylinder { axis: kind - 1 } },
+                kind: Kind::from_code(kind.into()).unwrap(),
                 additive,
                 center: center.into(),
                 half: half.into(),
@@ -281,5 +310,28 @@ mod tests {
         assert!((spans[0].start - 1.9).abs() < 1e-12 && (spans[0].end - 2.2).abs() < 1e-12);
         let normal = caster.normal(spans[0].entry, camera.ray(0.0, 0.0), spans[0].start);
         assert!((normal - DVec3::X).length() < 1e-12, "{normal}");
+    }
+
+    #[test]
+    fn a_slanted_face_has_its_depth_and_its_normal() {
+        // Seen from the front, the ray along -x meets x / 0.2 + y / 0.1 = 0, the face of a ramp, at the origin; one
+        // through height y at depth 1 where 2 - depth = -2 y depth.
+        let camera = Camera::orbit(0.0, 0.0, 0.0, 2.0);
+        let kind = Kind::Wedge { axis: 2, corner: [-1, -1] };
+        let half = DVec3::new(0.2, 0.1, 0.3);
+        let primitive = Primitive { kind, additive: true, center: DVec3::ZERO, half };
+        let shape = Shape::new(vec![primitive]).unwrap();
+        let caster = RayCaster::new(&shape, &camera);
+        let mut spans = Vec::new();
+        for image_y in [-0.1, 0.0, 0.1] {
+            let direction = camera.ray(0.0, image_y);
+            caster.spans(direction, &[0], &mut spans);
+            let expected = 2.0 / (1.0 - 2.0 * direction.y);
+            assert_eq!(spans.len(), 1);
+            assert!((spans[0].start - expected).abs() < 1e-12, "{} {expected}", spans[0].start);
+            let normal = caster.normal(spans[0].entry, direction, spans[0].start);
+            let across = DVec3::new(1.0, 2.0, 0.0).normalize();
+            assert!((normal - across).length() < 1e-12, "{normal}");
+        }
     }
 }
