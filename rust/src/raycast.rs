@@ -80,28 +80,37 @@ impl<'a> RayCaster<'a> {
     /// The unit normal of a face where the ray meets it, turned towards the eye.
     pub fn normal(&self, face: Face, direction: DVec3, depth: f64) -> DVec3 {
         let p = &self.primitives[face.primitive as usize];
-        let mut normal = DVec3::ZERO;
-        match (face.side, p.kind) {
-            (3, Kind::Cylinder { axis }) => {
-                let at = self.camera.position + direction * depth - p.center;
-                let (u, v) = cross_axes(axis);
-                normal[u] = at[u] / (p.half[u] * p.half[u]);
-                normal[v] = at[v] / (p.half[v] * p.half[v]);
-                normal = normal.normalize();
-            }
-            (3, Kind::Wedge { axis, corner }) => {
-                let (u, v) = cross_axes(axis);
-                normal[u] = f64::from(corner[0]) / p.half[u];
-                normal[v] = f64::from(corner[1]) / p.half[v];
-                normal = normal.normalize();
-            }
-            (side, _) => normal[usize::from(side)] = 1.0,
-        }
+        let normal = match face.side {
+            0 => DVec3::X,
+            1 => DVec3::Y,
+            2 => DVec3::Z,
+            _ => round_or_slanted(p, self.camera.position + direction * depth - p.center),
+        };
         if normal.dot(direction) > 0.0 { -normal } else { normal }
     }
 }
 
+/// A normal of the face that is not flat across an axis, at a point of it relative to the primitive's centre.
+fn round_or_slanted(primitive: &Primitive, at: DVec3) -> DVec3 {
+    let half = primitive.half;
+    let mut normal = DVec3::ZERO;
+    match primitive.kind {
+        Kind::Cuboid => {}
+        Kind::Cylinder { axis } => {
+            let (u, v) = cross_axes(axis);
+            (normal[u], normal[v]) = (at[u] / (half[u] * half[u]), at[v] / (half[v] * half[v]));
+        }
+        Kind::Wedge { axis, corner } => {
+            let (u, v) = cross_axes(axis);
+            (normal[u], normal[v]) = (f64::from(corner[0]) / half[u], f64::from(corner[1]) / half[v]);
+        }
+    }
+    normal.normalize()
+}
+
 /// Entry and exit depth of a ray through one primitive, with the sides it enters and leaves by.
+// In line, and wedges apart: drawing cuboids and cylinders takes a tenth longer otherwise.
+#[inline(always)]
 fn intersect(
     primitive: &Primitive,
     origin: DVec3,
@@ -125,11 +134,12 @@ fn intersect(
         a < b
     };
     match primitive.kind {
-        Kind::Cuboid | Kind::Wedge { .. } => {
+        Kind::Cuboid => {
             if !(slab(0) && slab(1) && slab(2)) {
                 return None;
             }
         }
+        Kind::Wedge { .. } => return intersect_wedge(primitive, origin, direction, inverse),
         Kind::Cylinder { axis } => {
             if !slab(axis) {
                 return None;
@@ -161,29 +171,33 @@ fn intersect(
             }
         }
     }
-    if let Kind::Wedge { axis, corner } = primitive.kind {
-        let (u, v) = cross_axes(axis);
-        let (nu, nv) = (f64::from(corner[0]) / primitive.half[u], f64::from(corner[1]) / primitive.half[v]);
-        // How far inside the slanted face, at the eye and for each unit of depth.
-        let (within, slope) = (nu * origin[u] + nv * origin[v], nu * direction[u] + nv * direction[v]);
-        if slope == 0.0 {
-            if within < 0.0 {
-                return None;
-            }
-        } else {
-            let t = -within / slope;
-            if slope > 0.0 && t > a {
-                (a, entry) = (t, 3);
-            }
-            if slope < 0.0 && t < b {
-                (b, exit) = (t, 3);
-            }
-            if a >= b {
-                return None;
-            }
-        }
-    }
     (b > 0.0).then_some((a, b, entry, exit))
+}
+
+/// What `intersect` finds of a wedge: its box, clipped by its slanted face.
+#[inline(never)]
+fn intersect_wedge(
+    primitive: &Primitive,
+    origin: DVec3,
+    direction: DVec3,
+    inverse: DVec3,
+) -> Option<(f64, f64, u8, u8)> {
+    let Kind::Wedge { axis, corner } = primitive.kind else { return None };
+    let cuboid = Primitive { kind: Kind::Cuboid, ..*primitive };
+    let (mut a, mut b, mut entry, mut exit) = intersect(&cuboid, origin, direction, inverse)?;
+    let (u, v) = cross_axes(axis);
+    let (nu, nv) = (f64::from(corner[0]) / primitive.half[u], f64::from(corner[1]) / primitive.half[v]);
+    // How far inside the slanted face, at the eye and for each unit of depth.
+    let (within, slope) = (nu * origin[u] + nv * origin[v], nu * direction[u] + nv * direction[v]);
+    let t = -within / slope;
+    if slope > 0.0 && t > a {
+        (a, entry) = (t, 3);
+    }
+    if slope < 0.0 && t < b {
+        (b, exit) = (t, 3);
+    }
+    let missed = a >= b || b <= 0.0 || (slope == 0.0 && within < 0.0);
+    (!missed).then_some((a, b, entry, exit))
 }
 
 /// Adds a stretch, joining it with those it touches.
@@ -200,7 +214,12 @@ fn unite(spans: &mut Vec<Span>, mut new: Span) {
         }
         last += 1;
     }
-    spans.splice(first..last, [new]);
+    if first == last {
+        spans.insert(first, new);
+    } else {
+        spans[first] = new;
+        spans.drain(first + 1..last);
+    }
 }
 
 /// Takes a stretch away.
