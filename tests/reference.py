@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from sketchcore.camera import Camera
-from sketchcore.shape import Cuboid, Cylinder, Shape
+from sketchcore.shape import Cuboid, Cylinder, Shape, Wedge
 
 SIDE = 64
 IMAGE = 256
@@ -30,8 +30,9 @@ def primitives():
     center = st.tuples(*[_numbers(-0.3, 0.3)] * 3)
     half = st.tuples(*[_numbers(0.03, 0.22)] * 3)
     op = st.sampled_from(["add", "add", "subtract"])
+    axis, corner = st.sampled_from("xyz"), st.tuples(*[st.sampled_from([-1, 1])] * 2)
     cuboid = st.builds(Cuboid, center, half, op)
-    return cuboid | st.builds(Cylinder, center, half, st.sampled_from("xyz"), op)
+    return cuboid | st.builds(Cylinder, center, half, axis, op) | st.builds(Wedge, center, half, axis, corner, op)
 
 
 def shapes(most=6):
@@ -76,6 +77,9 @@ def holds(primitive, points):
         return within.all(axis=-1)
     axis = "xyz".index(primitive.axis)
     across = [a for a in range(3) if a != axis]
+    if isinstance(primitive, Wedge):
+        # The section's corners lie at (1, 1) and (-1, -1) as seen from the right angle: the diagonal is in between.
+        return within.all(axis=-1) & ((parts[..., across] * primitive.corner).sum(axis=-1) >= 0.0)
     return within[..., axis] & ((parts[..., across] ** 2).sum(axis=-1) <= 1.0)
 
 
@@ -101,6 +105,18 @@ def directions(camera, size):
     return np.stack([x, y, np.ones_like(x)], axis=-1) @ camera.rotation
 
 
+def slanted(wedge):
+    """Unit normal of a wedge's slanted face, outwards: at right angles to its axis and to the diagonal it lies on."""
+    axis = "xyz".index(wedge.axis)
+    u, v = (a for a in range(3) if a != axis)
+    along = np.zeros(3)
+    along[[u, v]] = wedge.half[u] * wedge.corner[0], -wedge.half[v] * wedge.corner[1]
+    normal = np.cross(np.eye(3)[axis], along)
+    away = np.zeros(3)
+    away[[u, v]] = wedge.corner
+    return -np.sign(normal @ away) * normal / np.linalg.norm(normal)
+
+
 def _crossings(shape, origin, rays):
     """Depths at which rays [n, 3] cross the planes and curved surfaces of all primitives: sorted, [n, m]."""
     depths = [np.zeros(len(rays))]
@@ -119,6 +135,9 @@ def _crossings(shape, origin, rays):
                 a, b, c = (d * d).sum(axis=1), 2 * (d @ o), o @ o - 1
                 root = np.sqrt(b * b - 4 * a * c)
                 depths += [(-b - root) / (2 * a), (-b + root) / (2 * a)]
+            if isinstance(primitive, Wedge):
+                across = slanted(primitive)
+                depths.append((center - origin) @ across / (rays @ across))
     found = np.stack(depths, axis=1)
     found[~(np.isfinite(found) & (found > 0))] = 0.0
     return np.sort(found, axis=1)
@@ -165,6 +184,12 @@ def normals(shape, camera, hits):
             normal[..., axis][~curved] = 1.0
         else:
             np.put_along_axis(normal, off.argmin(axis=-1)[..., None], 1.0, axis=-1)
+            if isinstance(primitive, Wedge):
+                # Not where the ray runs along it: then it came in by the other face at that edge.
+                slant = (np.abs(at @ slanted(primitive)) < off.min(axis=-1)) & (
+                    np.abs(rays @ slanted(primitive)) > SLIVER
+                )
+                normal[slant] = slanted(primitive)
         normal[(before == behind) | ~seen] = 0.0
         away = (normal * rays).sum(axis=-1) > 0
         result.append(np.where(away[..., None], -normal, normal))

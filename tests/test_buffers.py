@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 import reference
 from sketchcore.camera import VIEWPOINTS, Camera
 from sketchcore.grids import buffers, frustum
-from sketchcore.shape import Cuboid, Cylinder, Shape
+from sketchcore.shape import Cuboid, Cylinder, Shape, Wedge
 
 SIZE = 128
 
@@ -52,6 +52,30 @@ def test_a_slanted_plane_is_affine_in_inverse_depth():
     assert (normal == [0, 1, 0]).all()
     bend = np.diff(1 / depth.astype(np.float64), 2, axis=1)
     assert np.abs(bend).max() < 1e-6
+
+
+@pytest.mark.parametrize("axis", "xyz")
+@pytest.mark.parametrize("corner", [(-1, -1), (-1, 1), (1, -1), (1, 1)])
+def test_the_face_of_a_wedge_has_its_depth_and_its_normal(axis, corner):
+    # The plane u su / hu + v sv / hv = 0, that is n . (eye + z ray) = 0; seen from outside it, so far on every side
+    # that it fills the image.
+    half = np.array([40.0, 50.0, 60.0])
+    u, v = (a for a in range(3) if "xyz"[a] != axis)
+    n = np.zeros(3)
+    n[u], n[v] = -corner[0] / half[u], -corner[1] / half[v]
+    n /= np.linalg.norm(n)
+    away = n + 0.2 * np.eye(3)["xyz".index(axis)]
+    elevation = np.degrees(np.arcsin(away[1] / np.linalg.norm(away)))
+    camera = Camera.orbit(np.degrees(np.arctan2(away[2], away[0])) + 3, elevation - 5)
+    depth, normal = buffers(Shape([Wedge((0, 0, 0), tuple(half), axis, corner)]), camera)
+    rays = reference.directions(camera, 256)
+    np.testing.assert_allclose(depth, -(camera.position @ n) / (rays @ n), atol=1e-6)
+    np.testing.assert_allclose(normal, np.broadcast_to(n, (256, 256, 3)), atol=1e-6)
+    # Cut out of a box that reaches as far, it leaves the same face, seen from the other half.
+    rest = [Cuboid((0, 0, 0), tuple(half)), Wedge((0, 0, 0), tuple(half), axis, (-corner[0], -corner[1]), "subtract")]
+    again = buffers(Shape(rest), camera)
+    np.testing.assert_allclose(again[0], depth, atol=1e-6)
+    np.testing.assert_allclose(again[1], normal, atol=1e-6)
 
 
 def test_a_cylinder_curves_away():
@@ -113,6 +137,7 @@ def test_a_frustum_holds_the_volume(name, rays):
     for primitive, volume in (
         (Cuboid((0.02, 0.01, -0.03), (0.3, 0.2, 0.25)), 8 * 0.3 * 0.2 * 0.25),
         (Cylinder((0.02, 0.01, -0.03), (0.3, 0.2, 0.25), "z"), np.pi * 0.3 * 0.2 * 0.5),
+        (Wedge((0.02, 0.01, -0.03), (0.3, 0.2, 0.25), "y", (1, -1)), 4 * 0.3 * 0.2 * 0.25),
     ):
         cells = frustum(Shape([primitive]), camera, rays)
         got = (cells.sum(axis=(1, 2)) / 255 * reference.cell_volumes(camera)).sum()

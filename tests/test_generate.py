@@ -224,6 +224,49 @@ def test_config_changes_what_it_names():
     assert plain.drawings.astype(bool).sum() < generate(0, 4).drawings.astype(bool).sum()
 
 
+WEDGES = {"grammar": {"wedges": 0.3}}
+
+
+def test_without_wedges_there_are_none(batch):
+    assert np.concatenate(batch.packed_shapes)[:, 0].max() == 3
+    same(generate(4, 4, views=3, config={"grammar": {"wedges": 0.0}}), cut(batch, slice(4), 3))
+
+
+def test_shapes_with_wedges_are_symmetric_and_in_one_piece():
+    made = generate(4, 64, config=WEDGES)
+    np.testing.assert_array_equal(made.world, made.world[..., ::-1])
+    for world, shape, cameras, drawing in zip(made.world, made.shapes, made.cameras, made.drawings, strict=True):
+        assert ndimage.label(world)[1] == 1
+        np.testing.assert_array_equal(world, reference.voxelize(shape))
+        np.testing.assert_array_equal(drawing[0], draw(shape, cameras[0]))
+    largest = sides(made.world).max(axis=1)
+    assert largest.min() >= 51
+    assert largest.max() <= 56
+
+
+def test_the_share_of_wedges():
+    rows = [row for rows in generate(0, 400, config=WEDGES).packed_shapes for row in rows]
+    # Mirror images, which come right after their primitive, are not counted.
+    drawn = [b for a, b in zip([np.zeros(8), *rows], rows, strict=False) if not (b[4] and b[4] == -a[4])]
+    kinds, op = np.array(drawn)[:, 0], np.array(drawn)[:, 1]
+    # Shapes that are drawn again take a few of each kind with them.
+    assert (kinds >= 4).mean() == pytest.approx(0.3, abs=0.04)
+    assert ((kinds > 0) & (kinds < 4)).mean() == pytest.approx(0.4, abs=0.05)
+    assert set(kinds) == set(range(16))
+    assert set(op[kinds >= 4]) == {0, 1}
+    only = generate(0, 8, config={"grammar": {"wedges": 1.0, "cylinders": 0.0}})
+    assert np.concatenate(only.packed_shapes)[:, 0].min() >= 4
+
+
+def test_wedges_in_the_plane_of_symmetry_are_paired_back_to_back():
+    rows = np.concatenate(generate(0, 64, config=WEDGES).packed_shapes)
+    first, second = rows[:-1], rows[1:]
+    paired = (first[:, 0] >= 4) & (first[:, 4] == first[:, 7]) & (second[:, 4] == -first[:, 4])
+    assert paired.sum() > 20
+    np.testing.assert_array_equal(first[paired][:, [2, 3, 5, 6, 7]], second[paired][:, [2, 3, 5, 6, 7]])
+    np.testing.assert_array_equal(first[paired][:, 0].astype(int) ^ 2, second[paired][:, 0])
+
+
 def test_the_default_config_is_complete_and_fresh():
     config = default_config()
     assert config["hand"]["share"] == 0.0
@@ -251,6 +294,8 @@ def test_the_default_config_is_complete_and_fresh():
         ({"grammar": {"steps": [0, 2]}}, r"grammar\.steps must be \[least, most\], from 1"),
         ({"grammar": {"steps": [1, 501]}}, r"grammar\.steps must be at most 500"),
         ({"grammar": {"cylinders": 2}}, r"grammar\.cylinders.* between 0 and 1"),
+        ({"grammar": {"wedges": -0.1}}, r"grammar\.cylinders, wedges.* between 0 and 1"),
+        ({"grammar": {"wedges": 0.7}}, r"grammar\.cylinders and wedges must be at most 1 together"),
         ({"grammar": {"subtracted": -1}}, "subtracted .* between 0 and 1"),
         ({"grammar": {"displaced": 1.1}}, "displaced .* between 0 and 1"),
         ({"grammar": {"first_half": [0, 1]}}, "first_half .* more than 0"),

@@ -140,7 +140,7 @@ def test_large_finite_volumes_are_taken():
 @pytest.mark.parametrize(
     ("column", "value", "message"),
     [
-        (0, 4, "primitive 1 has kind 4; 0 is a cuboid, 1, 2, 3 a cylinder along x, y, z"),
+        (0, 16, "primitive 1 has kind 16; 0 is a cuboid, 1, 2, 3 a cylinder along x, y, z, 4 to 7, .* a wedge"),
         (0, 0.5, "primitive 1 has kind 0.5"),
         (0, -1, "primitive 1 has kind -1"),
         (1, 2, "op"),

@@ -19,7 +19,7 @@ from sketchcore import _core
 from sketchcore.camera import VIEWPOINTS, Camera
 from sketchcore.datagen import generate
 from sketchcore.grids import buffers, draw
-from sketchcore.shape import Cuboid, Cylinder, Shape
+from sketchcore.shape import Cuboid, Cylinder, Shape, Wedge
 
 GOLDEN = Path(__file__).parent / "golden"
 ANY_CAMERA = reference.cameras() | st.sampled_from(list(VIEWPOINTS.values()))
@@ -42,6 +42,12 @@ SCENES = {
         Cylinder((0.15, 0.15, -0.2), (0.08, 0.2, 0.08)),
         Cylinder((-0.1, -0.1, 0.2), (0.1, 0.1, 0.15), "z", "subtract"),
         Cylinder((-0.1, -0.1, -0.2), (0.1, 0.1, 0.15), "z", "subtract"),
+    ],
+    "house-quarter-052": [
+        Cuboid((0, -0.2, 0), (0.35, 0.15, 0.25)),
+        Wedge((0, 0.1, 0.15), (0.4, 0.15, 0.15), "x", (-1, -1)),
+        Wedge((0, 0.1, -0.15), (0.4, 0.15, 0.15), "x", (-1, 1)),
+        Cuboid((-0.2, 0.2, 0.1), (0.05, 0.15, 0.04)),
     ],
     "tunnel-top": [
         Cuboid((0, 0, 0), (0.35, 0.3, 0.2)),
@@ -122,10 +128,11 @@ def test_a_crease_is_drawn_from_its_angle_on(crease, drawn):
 
 
 @pytest.mark.slow
-def test_outlines_are_closed():
+@pytest.mark.parametrize("wedges", [0.0, 0.3])
+def test_outlines_are_closed(wedges):
     structure = np.ones((3, 3))
     worst = 0
-    for shape in generate(20, 200).shapes:
+    for shape in generate(20, 200, config={"grammar": {"wedges": wedges}}).shapes:
         for camera in VIEWPOINTS.values():
             ink = draw(shape, camera) > 0
             seen = np.isfinite(buffers(shape, camera)[0])

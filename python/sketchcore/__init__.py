@@ -38,7 +38,7 @@ from sketchcore.grids import (
     to_world_grid,
     voxelize,
 )
-from sketchcore.shape import Cuboid, Cylinder, Shape
+from sketchcore.shape import Cuboid, Cylinder, Shape, Wedge
 from sketchcore.volume import iou
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ __all__ = [
     "Cylinder",
     "Reconstruction",
     "Shape",
+    "Wedge",
     "buffers",
     "carve",
     "datasets",

@@ -1,4 +1,7 @@
-"""Solid shapes as a sequence of cuboids and cylinders, added or subtracted (paper, section 4.1)."""
+"""Solid shapes as a sequence of cuboids, cylinders and wedges, added or subtracted.
+
+Cuboids and cylinders are the paper's (section 4.1); wedges, with their slanted faces, are ours.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +22,11 @@ def _triple(value: Sequence[float], name: str) -> tuple[float, float, float]:
     if array.shape != (3,) or not np.isfinite(array).all():
         raise ValueError(f"{name} must be three finite numbers, got {value!r}")
     return float(array[0]), float(array[1]), float(array[2])
+
+
+def _check_axis(axis: str) -> None:
+    if axis not in _AXES:
+        raise ValueError(f"axis must be 'x', 'y' or 'z', got {axis!r}")
 
 
 def _check(center: Sequence[float], half: Sequence[float], op: str) -> tuple[Any, Any]:
@@ -67,14 +75,48 @@ class Cylinder:
     op: str = "add"
 
     def __post_init__(self) -> None:
-        if self.axis not in _AXES:
-            raise ValueError(f"axis must be 'x', 'y' or 'z', got {self.axis!r}")
+        _check_axis(self.axis)
         center, half = _check(self.center, self.half, self.op)
         object.__setattr__(self, "center", center)
         object.__setattr__(self, "half", half)
 
 
-Primitive = Cuboid | Cylinder
+@dataclass(frozen=True)
+class Wedge:
+    """Half of an axis-aligned box, cut along a diagonal: a ramp, half of a gable roof, a windscreen.
+
+    It is a prism along one world axis; its section is a right triangle.
+
+    Attributes:
+        center: world x, y, z of the box, through which the slanted face goes.
+        half: half of the box's extent along x, y, z, each more than 0.
+        axis: "x", "y" or "z".
+        corner: the corner of the section that stays, where its right angle is: -1 or 1 along each of the two other
+            axes, in the order x, y, z. Of axis "x" and corner (-1, 1), the faces at low y and at high z are whole.
+        op: "add" or "subtract".
+
+    Raises:
+        ValueError: for an axis, corner or op that is none, sizes that are not more than 0, numbers that are not finite.
+    """
+
+    center: tuple[float, float, float]
+    half: tuple[float, float, float]
+    axis: str = "x"
+    corner: tuple[int, int] = (-1, -1)
+    op: str = "add"
+
+    def __post_init__(self) -> None:
+        _check_axis(self.axis)
+        corner = np.asarray(self.corner, dtype=np.float64)
+        if corner.shape != (2,) or not (np.abs(corner) == 1).all():
+            raise ValueError(f"corner must be two signs, each -1 or 1, got {self.corner!r}")
+        center, half = _check(self.center, self.half, self.op)
+        object.__setattr__(self, "center", center)
+        object.__setattr__(self, "half", half)
+        object.__setattr__(self, "corner", (int(corner[0]), int(corner[1])))
+
+
+Primitive = Cuboid | Cylinder | Wedge
 
 
 @dataclass(frozen=True)
@@ -82,7 +124,7 @@ class Shape:
     """Primitives in order: a point is inside when the *last* primitive that contains it is additive.
 
     Attributes:
-        primitives: `Cuboid` and `Cylinder`, at least one.
+        primitives: `Cuboid`, `Cylinder` and `Wedge`, at least one.
 
     Raises:
         ValueError: for no primitives.
@@ -96,25 +138,19 @@ class Shape:
         if not items:
             raise ValueError("a Shape needs at least one primitive")
         for item in items:
-            if not isinstance(item, Cuboid | Cylinder):
-                raise TypeError(f"a Shape is made of Cuboid and Cylinder, got {type(item).__name__}")
+            if not isinstance(item, Primitive):
+                raise TypeError(f"a Shape is made of Cuboid, Cylinder and Wedge, got {type(item).__name__}")
         object.__setattr__(self, "primitives", items)
 
     @property
     def packed(self) -> NDArray[np.float64]:
         """float64 [n, 8], the form the Rust core takes: kind, op, center, half.
 
-        Kind is 0 for a cuboid, 1, 2 or 3 for a cylinder along x, y or z; op is 1 to add, 0 to subtract.
+        Kind is 0 for a cuboid, 1, 2 or 3 for a cylinder along x, y or z, and 4, 8 or 12 for a wedge along them, with 1
+        more for a corner at the positive end of the first axis across, and 2 more for one of the second. Op is 1 to
+        add, 0 to subtract.
         """
-        rows = [
-            (
-                1.0 + _AXES.index(item.axis) if isinstance(item, Cylinder) else 0.0,
-                float(item.op == "add"),
-                *item.center,
-                *item.half,
-            )
-            for item in self.primitives
-        ]
+        rows = [(_kind(item), float(item.op == "add"), *item.center, *item.half) for item in self.primitives]
         return np.array(rows, dtype=np.float64)
 
     @classmethod
@@ -124,7 +160,13 @@ class Shape:
         for row in packed.tolist():
             kind, op = int(row[0]), "add" if row[1] else "subtract"
             center, half = (row[2], row[3], row[4]), (row[5], row[6], row[7])
-            items.append(Cylinder(center, half, _AXES[kind - 1], op) if kind else Cuboid(center, half, op))
+            if kind == 0:
+                items.append(Cuboid(center, half, op))
+            elif kind < 4:
+                items.append(Cylinder(center, half, _AXES[kind - 1], op))
+            else:
+                corner = (1 if kind & 1 else -1, 1 if kind & 2 else -1)
+                items.append(Wedge(center, half, _AXES[kind // 4 - 1], corner, op))
         return cls(items)
 
     def to_json(self) -> str:
@@ -144,10 +186,21 @@ class Shape:
         return cls(_from_dict(item, index) for index, item in enumerate(data["primitives"]))
 
 
-def _as_dict(item: Primitive) -> dict[str, Any]:
-    entry: dict[str, Any] = {"kind": "cylinder" if isinstance(item, Cylinder) else "cuboid"}
+def _kind(item: Primitive) -> float:
+    if isinstance(item, Cuboid):
+        return 0.0
+    axis = _AXES.index(item.axis)
     if isinstance(item, Cylinder):
+        return 1.0 + axis
+    return 4.0 + 4 * axis + (item.corner[0] > 0) + 2 * (item.corner[1] > 0)
+
+
+def _as_dict(item: Primitive) -> dict[str, Any]:
+    entry: dict[str, Any] = {"kind": type(item).__name__.lower()}
+    if not isinstance(item, Cuboid):
         entry["axis"] = item.axis
+    if isinstance(item, Wedge):
+        entry["corner"] = list(item.corner)
     return entry | {"center": list(item.center), "half": list(item.half), "op": item.op}
 
 
@@ -158,8 +211,10 @@ def _from_dict(item: Any, index: int) -> Primitive:
             return Cuboid(item["center"], item["half"], op)
         if item["kind"] == "cylinder":
             return Cylinder(item["center"], item["half"], item["axis"], op)
+        if item["kind"] == "wedge":
+            return Wedge(item["center"], item["half"], item["axis"], item["corner"], op)
     except KeyError as missing:
         raise ValueError(f"primitive {index} has no {missing}") from None
     except (AttributeError, TypeError, ValueError) as error:
         raise ValueError(f"primitive {index}: {error}") from None
-    raise ValueError(f"primitive {index} has kind {item['kind']!r}; the kinds are 'cuboid' and 'cylinder'")
+    raise ValueError(f"primitive {index} has kind {item['kind']!r}; the kinds are 'cuboid', 'cylinder' and 'wedge'")

@@ -143,7 +143,11 @@ mod tests {
     fn a_frustum_holds_the_volume() {
         let camera = Camera::orbit(30.0, 20.0, 0.0, 2.0);
         let pi = std::f64::consts::PI;
-        for (kind, exact) in [(Kind::Cuboid, 0.216), (Kind::Cylinder { axis: 0 }, pi * 0.09 * 0.6)] {
+        for (kind, exact) in [
+            (Kind::Cuboid, 0.216),
+            (Kind::Cylinder { axis: 0 }, pi * 0.09 * 0.6),
+            (Kind::Wedge { axis: 1, corner: [1, -1] }, 0.108),
+        ] {
             let mut out = vec![0; CELLS];
             fill_frustum(&one(kind, [0.3; 3]), &camera, 4, &mut out).unwrap();
             let depth = (camera.far - camera.near) / SIDE as f64;

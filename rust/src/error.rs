@@ -13,7 +13,10 @@ pub enum CoreError {
     NoPrimitives,
     #[error("primitive {index} has half sizes {half:?}; each must be more than 0")]
     ZeroSize { index: usize, half: [f64; 3] },
-    #[error("primitive {index} has kind {kind}; 0 is a cuboid, 1, 2, 3 a cylinder along x, y, z")]
+    #[error(
+        "primitive {index} has kind {kind}; 0 is a cuboid, 1, 2, 3 a cylinder along x, y, z, \
+         4 to 7, 8 to 11, 12 to 15 a wedge along them"
+    )]
     UnknownKind { index: usize, kind: f64 },
     #[error("primitive {index} has op {op}; 1 adds, 0 subtracts")]
     UnknownOp { index: usize, op: f64 },

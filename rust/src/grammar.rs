@@ -1,4 +1,5 @@
-//! The paper's shape grammar (section 4.1): cuboids and cylinders grown onto each other, symmetric about z = 0.
+//! The paper's shape grammar (section 4.1): cuboids and cylinders grown onto each other, symmetric about z = 0;
+//! and wedges, which are ours, where a config asks for them.
 //!
 //! Only sums, products and comparisons of 64-bit floats are used, so a seed's shapes are bit-identical on every
 //! machine.
@@ -19,6 +20,8 @@ pub struct GrammarConfig {
     pub steps: [usize; 2],
     /// Share of cylinders.
     pub cylinders: f64,
+    /// Share of wedges; with the cylinders at most 1. The paper has none.
+    pub wedges: f64,
     /// Share of subtracted primitives.
     pub subtracted: f64,
     /// Half sizes of the first primitive.
@@ -48,6 +51,7 @@ impl Default for GrammarConfig {
         Self {
             steps: [2, 10],
             cylinders: 0.4,
+            wedges: 0.0,
             subtracted: 0.33,
             first_half: [0.1, 0.4],
             half: [0.03, 0.25],
@@ -73,9 +77,10 @@ impl GrammarConfig {
         match self {
             c if !(1..=c.steps[1]).contains(&c.steps[0]) => bad("steps must be [least, most], from 1"),
             c if c.steps[1] > 500 => bad("steps must be at most 500"),
-            c if !(share(c.cylinders) && share(c.subtracted) && share(c.displaced)) => {
-                bad("cylinders, subtracted and displaced are shares between 0 and 1")
+            c if ![c.cylinders, c.wedges, c.subtracted, c.displaced].into_iter().all(share) => {
+                bad("cylinders, wedges, subtracted and displaced are shares between 0 and 1")
             }
+            c if c.cylinders + c.wedges > 1.0 => bad("cylinders and wedges must be at most 1 together"),
             c if !(range(c.first_half) && range(c.half)) => {
                 bad("first_half and half must be [least, most], more than 0")
             }
@@ -104,16 +109,14 @@ impl GrammarConfig {
 
     fn grow(&self, random: &mut Random) -> Vec<Primitive> {
         let steps = self.steps[0] + random.below(self.steps[1] - self.steps[0] + 1);
-        let mut shape = vec![self.primitive(self.first_half, true, random)];
+        let mut shape = Vec::new();
+        push_symmetric(&mut shape, self.primitive(self.first_half, true, random));
         for _ in 1..steps {
             let additive = !random.chance(self.subtracted);
             let mut new = self.primitive(self.half, additive, random);
             let faces: Vec<Primitive> = shape.iter().filter(|p| p.additive).copied().collect();
             self.place(&mut new, &faces[random.below(faces.len())], random);
-            shape.push(new);
-            if new.center.z != 0.0 {
-                shape.push(new.mirrored());
-            }
+            push_symmetric(&mut shape, new);
         }
         shape
     }
@@ -121,10 +124,14 @@ impl GrammarConfig {
     fn primitive(&self, half: [f64; 2], additive: bool, random: &mut Random) -> Primitive {
         let mut half = DVec3::from([(); 3].map(|()| random.between(half)));
         let mut kind = Kind::Cuboid;
-        if random.chance(self.cylinders) {
+        let share = random.unit();
+        if share < self.cylinders {
             let axis = random.below(3);
             kind = Kind::Cylinder { axis };
             half[(axis + 1) % 3] = half[(axis + 2) % 3];
+        } else if share < self.cylinders + self.wedges {
+            let axis = random.below(3);
+            kind = Kind::Wedge { axis, corner: [(); 2].map(|()| if random.chance(0.5) { 1 } else { -1 }) };
         }
         let center = DVec3::ZERO;
         Primitive { kind, additive, center, half }
@@ -174,14 +181,30 @@ impl GrammarConfig {
     }
 }
 
+/// Adds a primitive, and its mirror image where that is another one.
+///
+/// A wedge in the plane of symmetry that slopes across it becomes two of half its size, back to back: a gable or a
+/// valley.
+fn push_symmetric(shape: &mut Vec<Primitive>, mut new: Primitive) {
+    if new.center.z == 0.0 && new.mirrored() != new {
+        new.half.z *= 0.5;
+        new.center.z = new.half.z;
+    }
+    shape.push(new);
+    if new.mirrored() != new {
+        shape.push(new.mirrored());
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn shapes_are_symmetric_connected_and_scaled() {
-        let config = GrammarConfig::default();
-        for sample in 0..200 {
+        let paper = GrammarConfig::default();
+        let wedges = GrammarConfig { wedges: 0.3, ..paper.clone() };
+        for (config, sample) in (0..200).flat_map(|i| [(&paper, i), (&wedges, i)]) {
             let (shape, grid) = config.draw(&mut Random::new(7, sample, 0)).unwrap();
             assert!(grid.is_connected());
             let bounds = grid.bounds().unwrap();
@@ -204,9 +227,32 @@ mod tests {
         assert!(with(|c| c.steps = [3, 2]).contains("steps"));
         assert!(with(|c| c.half = [0.0, 1.0]).contains("half"));
         assert!(with(|c| c.cylinders = 1.5).contains("between 0 and 1"));
+        assert!(with(|c| c.wedges = -0.1).contains("between 0 and 1"));
+        assert!(with(|c| c.wedges = 0.7).contains("at most 1 together"));
         assert!(with(|c| c.cover = f64::NAN).contains("cover"));
         let hopeless = GrammarConfig { min_occupancy: 0.9, attempts: 5, ..GrammarConfig::default() };
         let error = hopeless.draw(&mut Random::new(0, 0, 0)).unwrap_err();
         assert_eq!(error, CoreError::NoShape { attempts: 5 });
+    }
+
+    #[test]
+    fn wedges_across_the_plane_of_symmetry_are_gables_and_valleys() {
+        let half = DVec3::new(0.1, 0.2, 0.3);
+        let wedge = |kind, z| Primitive { kind, additive: true, center: DVec3::new(0.0, 0.0, z), half };
+        let pushed = |primitive| {
+            let mut shape = Vec::new();
+            push_symmetric(&mut shape, primitive);
+            shape
+        };
+        let (up, across) =
+            (Kind::Wedge { axis: 2, corner: [1, -1] }, Kind::Wedge { axis: 0, corner: [-1, -1] });
+        assert_eq!(pushed(wedge(up, 0.0)), [wedge(up, 0.0)]);
+        assert_eq!(pushed(wedge(across, 0.2)), [wedge(across, 0.2), wedge(across, 0.2).mirrored()]);
+        let pair = pushed(wedge(across, 0.0));
+        assert_eq!((pair[0].center.z, pair[0].half.z), (0.15, 0.15));
+        assert_eq!(pair[1..], [pair[0].mirrored()]);
+        let gable = Shape::new(pair).unwrap();
+        assert!(gable.contains(DVec3::new(0.0, 0.19, 0.0)) && gable.contains(DVec3::new(0.0, -0.19, 0.28)));
+        assert!(!gable.contains(DVec3::new(0.0, 0.19, 0.28)));
     }
 }

@@ -29,33 +29,47 @@ impl BitGrid {
     pub fn of_shape(shape: &Shape) -> Self {
         let mut grid = Self::default();
         for p in shape.primitives() {
-            // Distances to the primitive's centre in half sizes squared, along each axis.
-            let squared: [[f64; SIDE]; 3] = std::array::from_fn(|a| {
-                std::array::from_fn(|i| {
-                    let d = (voxel_center(i) - p.center[a]).abs() / p.half[a];
-                    d * d
-                })
-            });
+            // Offsets from the primitive's centre in half sizes, along each axis.
+            let parts: [[f64; SIDE]; 3] =
+                std::array::from_fn(|a| std::array::from_fn(|i| (voxel_center(i) - p.center[a]) / p.half[a]));
             let within: [[bool; SIDE]; 3] = std::array::from_fn(|a| {
                 std::array::from_fn(|i| (voxel_center(i) - p.center[a]).abs() <= p.half[a])
             });
-            let z_mask = mask(|z| within[2][z]);
             match p.kind {
-                Kind::Cuboid => grid.write(p.additive, &within, |_, _| z_mask),
-                Kind::Cylinder { axis: 2 } => {
-                    let disc = |x: usize, y: usize| squared[0][x] + squared[1][y] <= 1.0;
-                    grid.write(p.additive, &within, |x, y| if disc(x, y) { z_mask } else { 0 });
+                Kind::Cuboid => {
+                    let z_mask = mask(|z| within[2][z]);
+                    grid.write(p.additive, &within, |_, _| z_mask);
                 }
                 Kind::Cylinder { axis } => {
-                    let across = cross_axes(axis).0 + cross_axes(axis).1 - 2;
-                    let section: [u64; SIDE] = std::array::from_fn(|i| {
-                        mask(|z| within[2][z] && squared[across][i] + squared[2][z] <= 1.0)
-                    });
-                    grid.write(p.additive, &within, |x, y| section[[x, y][across]]);
+                    grid.write_prism(p.additive, &within, &parts, axis, |a, b| a * a + b * b <= 1.0);
+                }
+                Kind::Wedge { axis, corner } => {
+                    let [u, v] = corner.map(f64::from);
+                    grid.write_prism(p.additive, &within, &parts, axis, |a, b| u * a + v * b >= 0.0);
                 }
             }
         }
         grid
+    }
+
+    /// Writes the same section all along an axis; `inside` is asked by offsets along the two cross axes.
+    fn write_prism(
+        &mut self,
+        additive: bool,
+        within: &[[bool; SIDE]; 3],
+        parts: &[[f64; SIDE]; 3],
+        axis: usize,
+        inside: impl Fn(f64, f64) -> bool,
+    ) {
+        let (u, v) = cross_axes(axis);
+        if axis == 2 {
+            let z_mask = mask(|z| within[2][z]);
+            self.write(additive, within, |x, y| if inside(parts[u][x], parts[v][y]) { z_mask } else { 0 });
+        } else {
+            let section: [u64; SIDE] =
+                std::array::from_fn(|i| mask(|z| within[2][z] && inside(parts[u][i], parts[v][z])));
+            self.write(additive, within, |x, y| section[[x, y][u]]);
+        }
     }
 
     fn write(&mut self, additive: bool, within: &[[bool; SIDE]; 3], column: impl Fn(usize, usize) -> u64) {
@@ -151,9 +165,9 @@ mod tests {
 
     pub fn any_primitive() -> impl Strategy<Value = Primitive> {
         let triple = |lo: f64, hi: f64| [lo..hi, lo..hi, lo..hi];
-        (0..4usize, any::<bool>(), triple(-0.4, 0.4), triple(0.01, 0.3)).prop_map(
+        (0..16u8, any::<bool>(), triple(-0.4, 0.4), triple(0.01, 0.3)).prop_map(
             |(kind, additive, center, half)| Primitive {
-                kind: if kind == 0 { Kind::Cuboid } else { Kind::Cylinder { axis: kind - 1 } },
+                kind: Kind::from_code(kind.into()).unwrap(),
                 additive,
                 center: center.into(),
                 half: half.into(),
@@ -174,6 +188,31 @@ mod tests {
                 let at = [i / 4096, i / 64 % 64, i % 64].map(voxel_center);
                 prop_assert_eq!(byte == 1, shape.contains(DVec3::from(at)));
             }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_primitive_and_its_mirror_image_are_mirror_images(primitive in any_primitive()) {
+            let grid = |p| BitGrid::of_shape(&Shape::new(vec![p]).unwrap());
+            let primitive = Primitive { additive: true, ..primitive };
+            let mirrored: Vec<u64> = grid(primitive).words.iter().map(|w| w.reverse_bits()).collect();
+            prop_assert_eq!(grid(primitive.mirrored()).words, mirrored);
+        }
+    }
+
+    #[test]
+    fn a_wedge_is_half_of_its_box() {
+        for code in 4..16 {
+            let wedge = Primitive {
+                kind: Kind::from_code(f64::from(code)).unwrap(),
+                additive: true,
+                center: DVec3::ZERO,
+                half: DVec3::splat(0.25),
+            };
+            // 32 voxels a side; those on the diagonal belong to it.
+            let count = BitGrid::of_shape(&Shape::new(vec![wedge]).unwrap()).count();
+            assert_eq!(count, 32 * 33 / 2 * 32);
         }
     }
 
