@@ -107,25 +107,28 @@ def test_cells_fold_and_unfold() -> None:
     torch.testing.assert_close(corner, volume[0, 2:4, 4:6, 6:8])
 
 
-def test_the_mirrored_camera_sees_the_flipped_drawing() -> None:
-    shape = sk.Shape([sk.Cuboid((0.1, -0.1, 0.15), (0.2, 0.3, 0.1)), sk.Cylinder((0, 0.2, -0.2), (0.1, 0.2, 0.1))])
-    mirror_image = sk.Shape(
-        [sk.Cuboid((0.1, -0.1, -0.15), (0.2, 0.3, 0.1)), sk.Cylinder((0, 0.2, 0.2), (0.1, 0.2, 0.1))]
-    )
+def test_the_mirrored_camera_sees_the_flipped_picture() -> None:
+    def shape(x: int, z: int) -> sk.Shape:
+        cuboid = sk.Cuboid((0.1 * x, -0.1, 0.15 * z), (0.2, 0.3, 0.1))
+        return sk.Shape([cuboid, sk.Cylinder((0, 0.2, -0.2 * z), (0.1, 0.2, 0.1))])
+
     for name in ("quarter-037", "quarter-322", "front", "top"):
         camera = sk.VIEWPOINTS[name]
-        mirrored = sk.Camera.from_packed(mirror_cameras(camera.packed[None])[0])
-        seen, flipped = sk.draw(mirror_image, mirrored), sk.draw(shape, camera)[:, ::-1]
-        # Ties in rounding may go to the other of two neighbours.
-        assert (seen != flipped).mean() < 1e-3
+        flipped = sk.buffers(shape(1, 1), camera)[0][:, ::-1]
+        for axis, image in ((2, shape(1, -1)), (0, shape(-1, 1))):
+            mirrored = sk.Camera.from_packed(mirror_cameras(camera.packed[None], axis)[0])
+            np.testing.assert_allclose(sk.buffers(image, mirrored)[0], flipped, rtol=1e-6)
 
 
 def test_a_mirrored_look_has_the_same_evidence() -> None:
     shape = sk.Shape([sk.Cuboid((0, 0, 0), (0.3, 0.2, 0.25)), sk.Cuboid((0.2, 0.2, 0), (0.1, 0.2, 0.1))])
     cameras = [sk.VIEWPOINTS[name] for name in ("quarter-052", "right")]
     sketches = Sketches(np.stack([sk.draw(shape, c) for c in cameras]), np.stack([c.packed for c in cameras]))
-    one, other = sketches.evidence.astype(int), sketches.mirrored().evidence.astype(int)
-    assert (np.abs(one - other) > 1).mean() < 0.01
+    plain = sketches.evidence.astype(int)
+    about_z, along_x = (sketches.mirrored(axis).evidence.astype(int) for axis in (2, 0))
+    assert (np.abs(plain - about_z) > 1).mean() < 0.01
+    assert (np.abs(plain[:, ::-1] - along_x) > 1).mean() < 0.01
+    assert (np.abs(plain - along_x) > 1).mean() > 0.05, "this shape is not symmetric along x"
 
 
 def test_rounds_take_turns_and_average() -> None:
@@ -134,13 +137,26 @@ def test_rounds_take_turns_and_average() -> None:
     looks = []
     read = model._read
     model._read = lambda s: (looks.append(s.cameras), read(s))[1]  # type: ignore[method-assign, func-returns-value]
-    volumes = list(model.rounds(sketches, 3))
-    assert len(volumes) == 4
-    assert [np.array_equal(c, sketches.cameras) for c in looks] == [True, False], "each side is read once"
+    volumes = list(model.rounds(sketches, 5))
+    assert len(volumes) == 6
+    cameras = sketches.cameras
+    mirrors = [cameras, mirror_cameras(cameras, 2), mirror_cameras(cameras, 0)]
+    mirrors.append(mirror_cameras(mirrors[2], 2))
+    np.testing.assert_array_equal(looks, mirrors, "each of the four is read once")
     for volume in volumes:
         assert volume.shape == (64, 64, 64)
         assert volume.dtype == np.float32
         np.testing.assert_array_equal(volume, volume[:, :, ::-1])
+
+
+def test_a_look_along_x_answers_in_the_world_as_it_is() -> None:
+    model = CompactModel(awake(CompactNet(TINY)), CPU)
+    sketches = chains((2,))[0].sketches
+    evidence = torch.from_numpy(sketches.evidence[None]).float() / 255
+    plain = model._decide(model._read(sketches), evidence, None, 2, flip=False)
+    mirrored = sketches.mirrored(0)
+    twice_mirrored = model._decide(model._read(mirrored.mirrored(0)), evidence.flip(2), None, 2, flip=True)
+    torch.testing.assert_close(plain, twice_mirrored.flip(1), atol=1e-4, rtol=1e-4)
 
 
 def test_a_volume_known_before_is_one_prediction_among_others() -> None:
@@ -148,7 +164,7 @@ def test_a_volume_known_before_is_one_prediction_among_others() -> None:
     sketches = chains((1,))[0].sketches
     start = np.zeros((64, 64, 64), np.float32)
     start[:, :, :32] = 1.0
-    model._decide = lambda *_: torch.full((1, 64, 64, 32), 0.2)  # type: ignore[method-assign]
+    model._decide = lambda *_, **__: torch.full((1, 64, 64, 32), 0.2)  # type: ignore[method-assign]
     np.testing.assert_allclose(next(model.rounds(sketches, 0, start)), (0.5 + 0.2) / 2, rtol=1e-6)
 
 

@@ -129,7 +129,7 @@ def test_a_filter_moves_as_its_matrix_would(layout: torch.memory_format) -> None
 
 
 def test_a_filter_that_is_a_view_is_refused() -> None:
-    kernel = torch.nn.Parameter(torch.randn(64, 40, 3, 6)[..., ::2])
+    kernel = torch.nn.Parameter(torch.randn(64, 40, 3, 6)[..., :3])
     with pytest.raises(ValueError, match="not dense in memory"):
         FilterMuon([kernel], lr=0.1)
 

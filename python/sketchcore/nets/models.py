@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import reduce
 from typing import Any, Protocol
 
 import numpy as np
@@ -34,11 +35,17 @@ class Model(Protocol):
         ...
 
 
-class CompactModel:
-    """`CompactNet`: every round looks at all drawings together, and the rounds take turns at looking in the mirror.
+LOOKS: tuple[tuple[int, ...], ...] = ((), (2,), (0,), (0, 2))
+"""Axes that the world is mirrored along in each of four rounds, over and over."""
 
-    A shape symmetric about z = 0 has two equal descriptions: its drawings, and the same flipped left to right with the
-    cameras mirrored. The volume is the mean of the latest predictions from both, and each next round's prior.
+
+class CompactModel:
+    """`CompactNet`: every round looks at all drawings together, and the rounds take turns at looking in a mirror.
+
+    Mirrored, a world is seen by mirrored cameras in drawings flipped left to right. That describes the same object
+    as well: about z = 0 because it is symmetric, along x because a mirrored object is an object too. The network
+    answers each of the four descriptions a little differently; the volume is the mean of its latest answers, and
+    each next round's prior.
     """
 
     def __init__(self, net: CompactNet, device: torch.device) -> None:
@@ -46,19 +53,19 @@ class CompactModel:
         self.device = device
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
-        latest: dict[str, Tensor] = {}
+        answers: dict[tuple[int, ...] | None, Tensor] = {}
         if start is not None:
             half = 0.5 * (start + start[:, :, ::-1])[:, :, 32:]
-            latest["start"] = torch.from_numpy(np.ascontiguousarray(half, np.float32)).to(self.device)[None]
+            answers[None] = torch.from_numpy(np.ascontiguousarray(half, np.float32)).to(self.device)[None]
         evidence = unit(sketches.evidence[None], self.device)
-        readings: dict[str, Tensor] = {}
+        readings: dict[tuple[int, ...], Tensor] = {}
         for number in range(iterations + 1):
-            side = "mirrored" if number % 2 else "plain"
-            if side not in readings:
-                readings[side] = self._read(sketches if side == "plain" else sketches.mirrored())
-            prior = torch.stack([*latest.values()]).mean(dim=0) if latest else None
-            latest[side] = self._decide(readings[side], evidence, prior, len(sketches))
-            mean = torch.stack([*latest.values()]).mean(dim=0)[0]
+            look = LOOKS[number % len(LOOKS)]
+            if look not in readings:
+                readings[look] = self._read(reduce(Sketches.mirrored, look, sketches))
+            prior = torch.stack([*answers.values()]).mean(dim=0) if answers else None
+            answers[look] = self._decide(readings[look], evidence, prior, len(sketches), flip=0 in look)
+            mean = torch.stack([*answers.values()]).mean(dim=0)[0]
             yield _array(torch.cat([mean.flip(2), mean], dim=2))
 
     @torch.inference_mode()
@@ -72,12 +79,16 @@ class CompactModel:
             )
 
     @torch.inference_mode()
-    def _decide(self, readings: Tensor, evidence: Tensor, prior: Tensor | None, count: int) -> Tensor:
+    def _decide(self, readings: Tensor, evidence: Tensor, prior: Tensor | None, count: int, flip: bool) -> Tensor:
+        """Occupancy, float [1, 64, 64, 32]; with `flip`, the readings are of a world mirrored along x."""
         has_prior = torch.full((1,), float(prior is not None), device=self.device)
         known = torch.zeros_like(evidence[:, 0]) if prior is None else prior
+        if flip:
+            evidence, known = evidence.flip(2), known.flip(1)
         with autocast(self.device):
             logits = self.net.decide(readings, evidence, known, has_prior, [count])
-        return logits.float().sigmoid()
+        probability = logits.float().sigmoid()
+        return probability.flip(1) if flip else probability
 
 
 class PaperModel:

@@ -36,16 +36,16 @@ class Sketches:
         """uint8 [3, 64, 64, 32]: what all drawings say about each voxel of the half grid z > 0."""
         return _core.evidence(self.fields, self.cameras)
 
-    def mirrored(self) -> Sketches:
-        """The same object, symmetric about z = 0, as the mirrored cameras see it: every drawing left to right."""
-        return Sketches(np.ascontiguousarray(self.drawings[:, :, ::-1]), mirror_cameras(self.cameras))
+    def mirrored(self, axis: int) -> Sketches:
+        """The object mirrored along a world axis (0 or 2 for x or z), as mirrored cameras see it."""
+        return Sketches(np.ascontiguousarray(self.drawings[:, :, ::-1]), mirror_cameras(self.cameras, axis))
 
 
-def mirror_cameras(cameras: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Packed cameras, float64 [n, 15], mirrored about z = 0; their images are flipped left to right."""
+def mirror_cameras(cameras: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+    """Packed cameras, float64 [n, 15], mirrored along a world axis; their images are flipped left to right."""
     mirrored = cameras.copy()
-    mirrored[:, 2] *= -1
-    axes = mirrored[:, 3:12].reshape(-1, 3, 3)
-    axes[:, :, 2] *= -1
-    axes[:, 0] *= -1
+    mirrored[:, axis] *= -1
+    rows = mirrored[:, 3:12].reshape(-1, 3, 3)
+    rows[:, :, axis] *= -1
+    rows[:, 0] *= -1
     return mirrored
