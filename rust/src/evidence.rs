@@ -9,7 +9,7 @@
 use crate::camera::{Camera, IMAGE};
 use crate::carve::{INK, silhouette};
 use crate::distance::{REACH, squared_distance};
-use crate::voxel::{CELLS, SIDE};
+use crate::voxel::{CELLS, SIDE, voxel_center};
 use glam::{DVec3, Vec3};
 use std::sync::LazyLock;
 
@@ -55,8 +55,7 @@ pub fn gather(fields: &[u8], cameras: &[Camera], out: &mut [u8]) {
     assert_eq!(out.len(), 3 * CELLS / 2);
     let (hull, rest) = out.split_at_mut(CELLS / 2);
     let (mean, least) = rest.split_at_mut(CELLS / 2);
-    let at = |i: usize| (i as f64 + 0.5) / SIDE as f64 - 0.5;
-    let heights: [f32; DEEP] = std::array::from_fn(|k| at(k + DEEP) as f32);
+    let heights: [f32; DEEP] = std::array::from_fn(|k| voxel_center(k + DEEP) as f32);
     let share = 0.5 / cameras.len().max(1) as f32;
     for x in 0..SIDE {
         for y in 0..SIDE {
@@ -65,7 +64,7 @@ pub fn gather(fields: &[u8], cameras: &[Camera], out: &mut [u8]) {
             hull.fill(255);
             least.fill(255);
             let mut total = [0u32; DEEP];
-            let foot = DVec3::new(at(x), at(y), 0.0);
+            let foot = DVec3::new(voxel_center(x), voxel_center(y), 0.0);
             for (camera, field) in cameras.iter().zip(fields.chunks_exact(FIELDS)) {
                 let start = camera.to_camera(foot).as_vec3();
                 for side in [1.0, -1.0] {

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -21,6 +22,8 @@ from torch.nn import functional as F
 from sketchcore.nets.decoder import WorldDecoder
 from sketchcore.nets.encoder import DrawingEncoder
 from sketchcore.nets.lift import COARSE, lift
+from sketchcore.nets.precision import unit
+from sketchcore.nets.sketches import Sketches
 
 
 @dataclass(frozen=True)
@@ -110,3 +113,13 @@ class CompactNet(nn.Module):
     def describe(self) -> dict[str, object]:
         """The configuration as plain data, for the file beside the weights."""
         return asdict(self.config)
+
+
+def read_inputs(samples: Sequence[Sketches], device: torch.device) -> dict[str, Any]:
+    """The arguments of `CompactNet.read` for the drawings of several objects."""
+    return {
+        "drawings": unit(np.concatenate([s.drawings for s in samples]), device),
+        "fields": unit(np.concatenate([s.fields for s in samples]), device).permute(0, 3, 1, 2),
+        "cameras": np.concatenate([s.cameras for s in samples]),
+        "counts": [len(s) for s in samples],
+    }

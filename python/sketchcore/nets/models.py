@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from sketchcore.nets.compact import CompactConfig, CompactNet
+from sketchcore.nets.compact import CompactConfig, CompactNet, read_inputs
 from sketchcore.nets.precision import autocast, pick_device, place, unit
 from sketchcore.nets.sketches import Sketches
 from sketchcore.nets.unet import PaperNet
@@ -54,29 +54,24 @@ class CompactModel:
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         answers: dict[tuple[int, ...] | None, Tensor] = {}
+        mean: Tensor | None = None
         if start is not None:
             half = 0.5 * (start + start[:, :, ::-1])[:, :, 32:]
-            answers[None] = torch.from_numpy(np.ascontiguousarray(half, np.float32)).to(self.device)[None]
+            mean = answers[None] = torch.from_numpy(np.ascontiguousarray(half, np.float32)).to(self.device)[None]
         evidence = unit(sketches.evidence[None], self.device)
         readings: dict[tuple[int, ...], Tensor] = {}
         for number in range(iterations + 1):
             look = LOOKS[number % len(LOOKS)]
             if look not in readings:
                 readings[look] = self._read(reduce(Sketches.mirrored, look, sketches))
-            prior = torch.stack([*answers.values()]).mean(dim=0) if answers else None
-            answers[look] = self._decide(readings[look], evidence, prior, len(sketches), flip=0 in look)
-            mean = torch.stack([*answers.values()]).mean(dim=0)[0]
-            yield _array(torch.cat([mean.flip(2), mean], dim=2))
+            answers[look] = self._decide(readings[look], evidence, mean, len(sketches), flip=0 in look)
+            mean = torch.stack([*answers.values()]).mean(dim=0)
+            yield _array(torch.cat([mean.flip(3), mean], dim=3)[0])
 
     @torch.inference_mode()
     def _read(self, sketches: Sketches) -> Tensor:
         with autocast(self.device):
-            return self.net.read(
-                unit(sketches.drawings, self.device),
-                unit(sketches.fields, self.device).permute(0, 3, 1, 2),
-                sketches.cameras,
-                [len(sketches)],
-            )
+            return self.net.read(**read_inputs([sketches], self.device))
 
     @torch.inference_mode()
     def _decide(self, readings: Tensor, evidence: Tensor, prior: Tensor | None, count: int, flip: bool) -> Tensor:

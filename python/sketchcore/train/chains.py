@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from sketchcore.datagen.generate import generate
-from sketchcore.nets.compact import CompactConfig, CompactNet
+from sketchcore.nets.compact import CompactConfig, CompactNet, read_inputs
 from sketchcore.nets.precision import autocast, place, unit
 from sketchcore.nets.sketches import Sketches
 from sketchcore.train.loss import occupancy_loss
@@ -146,10 +146,7 @@ def compact_inputs(chains: list[Chain], device: torch.device) -> dict[str, Any]:
     """The arguments of `CompactNet.forward` for a batch of chains."""
     sketches = [c.sketches for c in chains]
     return {
-        "drawings": unit(np.concatenate([s.drawings for s in sketches]), device),
-        "fields": unit(np.concatenate([s.fields for s in sketches]), device).permute(0, 3, 1, 2),
-        "cameras": np.concatenate([s.cameras for s in sketches]),
-        "counts": [len(s) for s in sketches],
+        **read_inputs(sketches, device),
         "evidence": unit(np.stack([s.evidence for s in sketches]), device),
         "prior": torch.from_numpy(np.stack([c.prior for c in chains])).to(device),
         "has_prior": torch.tensor([float(c.depth > 0) for c in chains], device=device),
