@@ -267,6 +267,47 @@ def test_wedges_in_the_plane_of_symmetry_are_paired_back_to_back():
     np.testing.assert_array_equal(first[paired][:, 0].astype(int) ^ 2, second[paired][:, 0])
 
 
+def test_slabs_are_wedges_without_their_right_angle():
+    only = {"cylinders": 0.0, "wedges": 1.0, "subtracted": 0.0}
+    rows = generate(0, 32, config={"grammar": {**only, "slabs": 1.0, "slab_thickness": [0.25, 0.25]}}).packed_shapes
+    cuts = 0
+    for shape in rows:
+        added = shape[shape[:, 1] == 1]
+        for cut in shape[shape[:, 1] == 0]:
+            # Cut from a wedge of the same kind that shares the right angle, a quarter thinner across its axis.
+            like = added[(added[:, 0] == cut[0]) & np.isclose(added[:, 5:], cut[5:] / 0.75, rtol=1e-9).any(axis=1)]
+            axis = int(cut[0]) // 4 - 1
+            across = [a for a in range(3) if a != axis]
+            corner = np.where([int(cut[0]) & 1, int(cut[0]) & 2], 1, -1)
+            theirs, ours = ((w[..., 2:5] + 0)[..., across] + corner * w[..., 5:][..., across] for w in (like, cut))
+            assert np.isclose(theirs, ours, atol=1e-12).all(axis=1).any()
+            cuts += 1
+    assert cuts > 32
+
+
+def test_free_cameras_stand_anywhere():
+    made = generate(0, 64, views=4, config={"free": {"share": 0.5, "elevation": [10, 50], "fov": [30, 50]}})
+    fixed = generate(0, 64, views=4)
+    same_place = (made.packed_cameras == fixed.packed_cameras).all(axis=2)
+    assert 0.4 < same_place.mean() < 0.6
+    np.testing.assert_array_equal(made.drawings[same_place], fixed.drawings[same_place])
+    np.testing.assert_array_equal(made.frusta[same_place], fixed.frusta[same_place])
+    free = made.packed_cameras[~same_place]
+    elevations = np.degrees(np.arcsin(-free[:, 10]))
+    assert 10 <= elevations.min() < 15
+    assert 45 < elevations.max() <= 50
+    assert 30 <= free[:, 12].min() < 33
+    assert 47 < free[:, 12].max() <= 50
+    assert (np.histogram(np.arctan2(free[:, 11], free[:, 9]), bins=8, range=(-np.pi, np.pi))[0] > 5).all()
+    # A ball around the world fills the image at any field of view, and the grid is as deep as ever.
+    distances = 0.5 * (free[:, 13] + free[:, 14])
+    np.testing.assert_allclose(distances * np.sin(np.radians(free[:, 12] / 2)), 2 * np.sin(np.radians(22.5)))
+    np.testing.assert_allclose(free[:, 14] - free[:, 13], 1.5)
+    for sample in np.flatnonzero(~same_place.all(axis=1))[:8]:
+        for drawing, camera in zip(made.drawings[sample], made.cameras[sample], strict=True):
+            np.testing.assert_array_equal(drawing, draw(made.shapes[sample], camera))
+
+
 def test_the_default_config_is_complete_and_fresh():
     config = default_config()
     assert config["hand"]["share"] == 0.0
@@ -287,6 +328,11 @@ def test_the_default_config_is_complete_and_fresh():
         ({"frustum_rays": 0}, "frustum_rays must lie between 1 and 4"),
         ({"frustum_rays": 5}, "frustum_rays must lie between 1 and 4"),
         ({"hand": {"share": 1.5}}, r"hand\.share must lie between 0 and 1"),
+        ({"free": {"share": -1}}, "free: share must lie between 0 and 1"),
+        ({"free": {"elevation": [10, 90]}}, r"elevation \[least, most\] between -85 and 85"),
+        ({"free": {"fov": [50, 30]}}, r"free\.fov must be \[least, most\] between 10 and 90"),
+        ({"grammar": {"slabs": 1.5}}, r"grammar\..*slabs.* between 0 and 1"),
+        ({"grammar": {"slab_thickness": [0.5, 1]}}, r"grammar\.slab_thickness must be"),
         ({"hand": {"azimuth": 60}}, "hand: angles must lie between 0 and 45"),
         ({"hand": {"fov": 0.9}}, "fov between 0 and 0.75"),
         ({"hand": {"pen": {"width": [3, 1]}}}, r"hand\.pen: every entry is \[least, most\]"),

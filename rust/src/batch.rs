@@ -1,7 +1,7 @@
 //! Whole samples: shape, cameras, drawings, world grid and camera grids, as a function of (config, seed, index).
 
 use crate::buffers::{Buffers, fill_frustum};
-use crate::camera::{Camera, DISTANCE, IMAGE, QUARTER_VIEWS, VIEWPOINTS};
+use crate::camera::{Camera, DISTANCE, FAR, FOV_DEGREES, IMAGE, NEAR, QUARTER_VIEWS, VIEWPOINTS};
 use crate::csg::Shape;
 use crate::error::CoreError;
 use crate::grammar::GrammarConfig;
@@ -21,6 +21,7 @@ pub struct SampleConfig {
     /// Largest displacement of a camera along each of its axes, world units. The first is displaced parallel to
     /// the image only.
     pub displacement: f64,
+    pub free: FreeConfig,
     pub lines: LineConfig,
     pub hand: HandConfig,
     /// Rays a side by which a camera-grid cell is measured; at most 4.
@@ -32,10 +33,29 @@ impl Default for SampleConfig {
         Self {
             grammar: GrammarConfig::default(),
             displacement: 0.06,
+            free: FreeConfig::default(),
             lines: LineConfig::default(),
             hand: HandConfig::default(),
             frustum_rays: 2,
         }
+    }
+}
+
+/// Cameras from anywhere around, for networks that are to take any calibrated drawing.
+#[derive(Clone, Debug, Serialize, Deserialize, PartialEq)]
+#[serde(default, deny_unknown_fields)]
+pub struct FreeConfig {
+    /// Share of the cameras that stand anywhere; the others stand at the viewpoints.
+    pub share: f64,
+    /// Degrees above the horizon, least and most.
+    pub elevation: [f64; 2],
+    /// Field of view in degrees, least and most; its distance is such that the world appears as large as ever.
+    pub fov: [f64; 2],
+}
+
+impl Default for FreeConfig {
+    fn default() -> Self {
+        Self { share: 0.0, elevation: [5.0, 60.0], fov: [25.0, 60.0] }
     }
 }
 
@@ -89,6 +109,14 @@ impl SampleConfig {
         if !(0.0..=1.0).contains(&self.displacement) {
             return bad("displacement must lie between 0 and 1");
         }
+        let free = &self.free;
+        let within = |[from, to]: [f64; 2], least: f64, most: f64| least <= from && from <= to && to <= most;
+        if !((0.0..=1.0).contains(&free.share) && within(free.elevation, -85.0, 85.0)) {
+            return bad("free: share must lie between 0 and 1, elevation [least, most] between -85 and 85");
+        }
+        if !within(free.fov, 10.0, 90.0) {
+            return bad("free.fov must be [least, most] between 10 and 90");
+        }
         if !(1..=4).contains(&self.frustum_rays) {
             return bad("frustum_rays must lie between 1 and 4");
         }
@@ -113,10 +141,11 @@ pub struct Slot<'a> {
     pub frusta: &'a mut [u8],
 }
 
-/// Purposes of a sample's random streams; the pen of view v is `PEN + v`.
+/// Purposes of a sample's random streams; the pen of view v is `PEN + v`, its free camera `FREE + v`.
 const SHAPE: u64 = 0;
 const CAMERAS: u64 = 1;
 const PEN: u64 = 2;
+const FREE: u64 = 64;
 
 /// Makes sample `index`, of as many views as `slot` has room for.
 pub fn sample(
@@ -128,12 +157,13 @@ pub fn sample(
     let views = slot.drawings.len() / (IMAGE * IMAGE);
     let (shape, grid) = config.grammar.draw(&mut Random::new(seed, index, SHAPE))?;
     grid.write_bytes(slot.world);
-    let cameras = draw_cameras(config, &shape, views, &mut Random::new(seed, index, CAMERAS));
+    let free = |v: usize| Random::new(seed, index, FREE + v as u64);
+    let cameras = draw_cameras(config, &shape, views, &mut Random::new(seed, index, CAMERAS), free);
     let arrays = slot.drawings.chunks_exact_mut(IMAGE * IMAGE).zip(slot.frusta.chunks_exact_mut(CELLS));
-    for (v, ((viewpoint, camera), (drawing, frustum))) in cameras.iter().zip(arrays).enumerate() {
+    for (v, ((stand, camera), (drawing, frustum))) in cameras.iter().zip(arrays).enumerate() {
         let mut random = Random::new(seed, index, PEN + v as u64);
         if random.chance(config.hand.share) {
-            let hand = hand_camera(&config.hand, *viewpoint, camera, &shape, &mut random);
+            let hand = hand_camera(&config.hand, stand, camera, &shape, &mut random);
             let ink = ink(&shape, &hand, &config.lines)?;
             drawing.copy_from_slice(&redraw(ink, &config.hand.pen, &mut random));
         } else {
@@ -172,24 +202,62 @@ fn write_drawing(ink: &[bool], out: &mut [u8]) {
     out.iter_mut().zip(ink).for_each(|(o, &i)| *o = if i { 255 } else { 0 });
 }
 
-/// Distinct viewpoints, the first one of the eight, each displaced as far as the shape stays in sight.
+/// Where a camera stands before it is displaced, in degrees.
+struct Stand {
+    azimuth: f64,
+    elevation: f64,
+    fov: f64,
+}
+
+impl Stand {
+    fn at_viewpoint(index: usize) -> Self {
+        let (azimuth, elevation) = VIEWPOINTS[index];
+        Self { azimuth, elevation, fov: FOV_DEGREES }
+    }
+
+    fn anywhere(config: &FreeConfig, random: &mut Random) -> Self {
+        let azimuth = random.unit() * 360.0;
+        Self { azimuth, elevation: random.between(config.elevation), fov: random.between(config.fov) }
+    }
+
+    /// How far from the origin: such that a ball around the world fills the image whatever the field of view.
+    fn distance(&self) -> f64 {
+        let sine = |fov: f64| (fov.to_radians() / 2.0).sin();
+        DISTANCE * (sine(FOV_DEGREES) / sine(self.fov))
+    }
+
+    fn camera(&self, roll: f64) -> Camera {
+        let distance = self.distance();
+        let at = Camera::orbit(self.azimuth, self.elevation, roll, distance);
+        let (near, far) = (distance + (NEAR - DISTANCE), distance + (FAR - DISTANCE));
+        Camera::new(at.position, at.axes, self.fov, near, far).unwrap_or(at)
+    }
+}
+
+/// Distinct viewpoints, the first one of the eight, some exchanged for free cameras, each displaced as far as the
+/// shape stays in sight.
 fn draw_cameras(
     config: &SampleConfig,
     shape: &Shape,
     views: usize,
     random: &mut Random,
-) -> Vec<(usize, Camera)> {
-    let mut free: Vec<usize> = (0..VIEWPOINTS.len()).collect();
+    free: impl Fn(usize) -> Random,
+) -> Vec<(Stand, Camera)> {
+    let mut left: Vec<usize> = (0..VIEWPOINTS.len()).collect();
     let corners = corners(shape);
     (0..views)
         .map(|v| {
-            let choices = if v == 0 { QUARTER_VIEWS } else { free.len() };
-            let viewpoint = free.remove(random.below(choices));
-            let (azimuth, elevation) = VIEWPOINTS[viewpoint];
-            let camera = Camera::orbit(azimuth, elevation, 0.0, DISTANCE);
+            let choices = if v == 0 { QUARTER_VIEWS } else { left.len() };
+            let mut stand = Stand::at_viewpoint(left.remove(random.below(choices)));
+            let mut free = free(v);
+            if free.chance(config.free.share) {
+                stand = Stand::anywhere(&config.free, &mut free);
+            }
+            let camera = stand.camera(0.0);
             let by = DVec3::from([(); 3].map(|()| random.around(config.displacement)));
             let by = if v == 0 { by.with_z(0.0) } else { by };
-            (viewpoint, camera.displaced(by * camera.room_for(by, &corners)))
+            let by = by * camera.room_for(by, &corners);
+            (stand, camera.displaced(by))
         })
         .collect()
 }
@@ -197,20 +265,19 @@ fn draw_cameras(
 /// The camera that a person draws by: the given one, somewhat turned about the origin, at the same displacement.
 fn hand_camera(
     config: &HandConfig,
-    viewpoint: usize,
+    stand: &Stand,
     camera: &Camera,
     shape: &Shape,
     random: &mut Random,
 ) -> Camera {
-    let (azimuth, elevation) = VIEWPOINTS[viewpoint];
     let displacement = camera.to_camera(DVec3::ZERO);
-    let turned = Camera::orbit(
-        azimuth + random.around(config.azimuth),
-        elevation + random.around(config.elevation),
-        random.around(config.roll),
-        DISTANCE,
-    );
-    let by = DVec3::new(0.0, 0.0, DISTANCE) - displacement;
+    let turned = Stand {
+        azimuth: stand.azimuth + random.around(config.azimuth),
+        elevation: stand.elevation + random.around(config.elevation),
+        fov: stand.fov,
+    };
+    let turned = turned.camera(random.around(config.roll));
+    let by = DVec3::new(0.0, 0.0, stand.distance()) - displacement;
     let fov = camera.fov_degrees * (1.0 + random.around(config.fov));
     let by = by * turned.room_for(by, &corners(shape));
     let turned = turned.displaced(by);
@@ -251,8 +318,9 @@ mod tests {
 
     #[test]
     fn shapes_stay_in_sight() {
-        let config = SampleConfig::default();
+        let mut config = SampleConfig::default();
         for index in 0..40 {
+            config.free.share = f64::from(index >= 20);
             let (drawings, frusta, cameras) = make(&config, index, 13);
             assert_eq!(cameras.len(), 13);
             for (drawing, frustum) in drawings.chunks(IMAGE * IMAGE).zip(frusta.chunks(CELLS)) {
@@ -268,6 +336,9 @@ mod tests {
         assert_eq!(SampleConfig::from_json("{}").unwrap(), SampleConfig::default());
         let refused = |text: &str| SampleConfig::from_json(text).unwrap_err().to_string();
         assert!(refused("{\"grammer\": 1}").contains("unknown field `grammer`"));
+        assert!(refused("{\"free\": {\"share\": 2}}").contains("between 0 and 1"));
+        assert!(refused("{\"free\": {\"elevation\": [60, 5]}}").contains("[least, most]"));
+        assert!(refused("{\"free\": {\"fov\": [5, 50]}}").contains("between 10 and 90"));
         assert!(refused("{\"frustum_rays\": 9}").contains("between 1 and 4"));
         assert!(refused("{\"hand\": {\"pen\": {\"width\": [3, 1]}}}").contains("[least, most]"));
         assert!(refused("{").contains("EOF"));

@@ -129,9 +129,11 @@ impl Camera {
     }
 }
 
-const FOV_DEGREES: f64 = 45.0;
-const NEAR: f64 = 1.25;
-const FAR: f64 = 2.75;
+/// Field of view of a viewpoint.
+pub const FOV_DEGREES: f64 = 45.0;
+/// Depths of a viewpoint's first and last slice.
+pub const NEAR: f64 = 1.25;
+pub const FAR: f64 = 2.75;
 /// Distance of a viewpoint from the origin.
 pub const DISTANCE: f64 = 2.0;
 

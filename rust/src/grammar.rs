@@ -4,7 +4,7 @@
 //! Only sums, products and comparisons of 64-bit floats are used, so a seed's shapes are bit-identical on every
 //! machine.
 
-use crate::csg::{Kind, Primitive, Shape};
+use crate::csg::{Kind, Primitive, Shape, cross_axes};
 use crate::error::CoreError;
 use crate::random::Random;
 use crate::voxel::{BitGrid, CELLS, SIDE};
@@ -22,6 +22,10 @@ pub struct GrammarConfig {
     pub cylinders: f64,
     /// Share of wedges; with the cylinders at most 1. The paper has none.
     pub wedges: f64,
+    /// Share of the added wedges that are cut down to slanted slabs, such as a strut or half a roof.
+    pub slabs: f64,
+    /// Thickness of a slab as a share of its wedge's.
+    pub slab_thickness: [f64; 2],
     /// Share of subtracted primitives.
     pub subtracted: f64,
     /// Half sizes of the first primitive.
@@ -52,6 +56,8 @@ impl Default for GrammarConfig {
             steps: [2, 10],
             cylinders: 0.4,
             wedges: 0.0,
+            slabs: 0.0,
+            slab_thickness: [0.15, 0.5],
             subtracted: 0.33,
             first_half: [0.1, 0.4],
             half: [0.03, 0.25],
@@ -77,12 +83,15 @@ impl GrammarConfig {
         match self {
             c if !(1..=c.steps[1]).contains(&c.steps[0]) => bad("steps must be [least, most], from 1"),
             c if c.steps[1] > 500 => bad("steps must be at most 500"),
-            c if ![c.cylinders, c.wedges, c.subtracted, c.displaced].into_iter().all(share) => {
-                bad("cylinders, wedges, subtracted and displaced are shares between 0 and 1")
+            c if ![c.cylinders, c.wedges, c.slabs, c.subtracted, c.displaced].into_iter().all(share) => {
+                bad("cylinders, wedges, slabs, subtracted and displaced are shares between 0 and 1")
             }
             c if c.cylinders + c.wedges > 1.0 => bad("cylinders and wedges must be at most 1 together"),
             c if !(range(c.first_half) && range(c.half)) => {
                 bad("first_half and half must be [least, most], more than 0")
+            }
+            c if !(range(c.slab_thickness) && c.slab_thickness[1] < 1.0) => {
+                bad("slab_thickness must be [least, most], between 0 and 1")
             }
             c if !(amplitude(c.displacement) && amplitude(c.overlap) && amplitude(c.sink)) => {
                 bad("displacement, overlap and sink must be 0 or more")
@@ -116,7 +125,15 @@ impl GrammarConfig {
             let mut new = self.primitive(self.half, additive, random);
             let faces: Vec<Primitive> = shape.iter().filter(|p| p.additive).copied().collect();
             self.place(&mut new, &faces[random.below(faces.len())], random);
+            let added = shape.len();
             push_symmetric(&mut shape, new);
+            let slab = additive && self.slabs > 0.0 && matches!(new.kind, Kind::Wedge { .. });
+            if slab && random.chance(self.slabs) {
+                let thickness = random.between(self.slab_thickness);
+                shape.extend_from_within(added..);
+                let cut = (added + shape.len()) / 2;
+                shape[cut..].iter_mut().for_each(|wedge| *wedge = beyond_slab(*wedge, thickness));
+            }
         }
         shape
     }
@@ -196,6 +213,18 @@ fn push_symmetric(shape: &mut Vec<Primitive>, mut new: Primitive) {
     }
 }
 
+/// What to take from a wedge so that a slab along its slanted face is left: the wedge shrunk towards its right angle.
+fn beyond_slab(wedge: Primitive, thickness: f64) -> Primitive {
+    let Kind::Wedge { axis, corner } = wedge.kind else { return wedge };
+    let mut cut = Primitive { additive: false, ..wedge };
+    let (u, v) = cross_axes(axis);
+    for (a, sign) in [(u, corner[0]), (v, corner[1])] {
+        cut.half[a] *= 1.0 - thickness;
+        cut.center[a] += f64::from(sign) * (wedge.half[a] - cut.half[a]);
+    }
+    cut
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -203,7 +232,7 @@ mod tests {
     #[test]
     fn shapes_are_symmetric_connected_and_scaled() {
         let paper = GrammarConfig::default();
-        let wedges = GrammarConfig { wedges: 0.3, ..paper.clone() };
+        let wedges = GrammarConfig { wedges: 0.3, slabs: 0.5, ..paper.clone() };
         for (config, sample) in (0..200).flat_map(|i| [(&paper, i), (&wedges, i)]) {
             let (shape, grid) = config.draw(&mut Random::new(7, sample, 0)).unwrap();
             assert!(grid.is_connected());
@@ -229,6 +258,8 @@ mod tests {
         assert!(with(|c| c.cylinders = 1.5).contains("between 0 and 1"));
         assert!(with(|c| c.wedges = -0.1).contains("between 0 and 1"));
         assert!(with(|c| c.wedges = 0.7).contains("at most 1 together"));
+        assert!(with(|c| c.slabs = 2.0).contains("between 0 and 1"));
+        assert!(with(|c| c.slab_thickness = [0.5, 1.0]).contains("slab_thickness"));
         assert!(with(|c| c.cover = f64::NAN).contains("cover"));
         let hopeless = GrammarConfig { min_occupancy: 0.9, attempts: 5, ..GrammarConfig::default() };
         let error = hopeless.draw(&mut Random::new(0, 0, 0)).unwrap_err();
@@ -254,5 +285,22 @@ mod tests {
         let gable = Shape::new(pair).unwrap();
         assert!(gable.contains(DVec3::new(0.0, 0.19, 0.0)) && gable.contains(DVec3::new(0.0, -0.19, 0.28)));
         assert!(!gable.contains(DVec3::new(0.0, 0.19, 0.28)));
+    }
+    #[test]
+    fn a_slab_keeps_to_its_slanted_face() {
+        let half = DVec3::new(0.1, 0.2, 0.3);
+        let kind = Kind::Wedge { axis: 2, corner: [1, -1] };
+        let wedge = Primitive { kind, additive: true, center: DVec3::ZERO, half };
+        let slab = Shape::new(vec![wedge, beyond_slab(wedge, 0.25)]).unwrap();
+        // From the slanted face through the origin towards the right angle at (0.1, -0.2).
+        let towards = |share: f64| DVec3::new(0.1 * share, -0.2 * share, 0.0);
+        assert!(slab.contains(towards(0.0)) && slab.contains(towards(0.24)));
+        assert!(
+            !slab.contains(towards(-0.01)) && !slab.contains(towards(0.26)) && !slab.contains(towards(0.99))
+        );
+        // Its ends reach as far as the wedge's.
+        assert!(
+            slab.contains(DVec3::new(0.099, 0.195, 0.0)) && slab.contains(DVec3::new(-0.095, -0.199, 0.0))
+        );
     }
 }

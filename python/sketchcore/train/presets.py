@@ -54,7 +54,11 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
             cooldown=0.3,
             average=0.998,
             clip=1.0,
-            generator={"hand": {"share": 0.7}},
+            generator={
+                "grammar": {"wedges": 0.2, "slabs": 0.4},
+                "free": {"share": 0.25},
+                "hand": {"share": 0.7},
+            },
         ),
     }
 )
