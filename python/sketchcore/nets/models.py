@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from sketchcore.nets.compact import CompactConfig, CompactNet, read_inputs
+from sketchcore.nets.outlines import heed_outlines
 from sketchcore.nets.precision import autocast, pick_device, place, unit
 from sketchcore.nets.sketches import Sketches
 from sketchcore.nets.unet import PaperNet
@@ -45,7 +46,7 @@ class CompactModel:
     Mirrored, a world is seen by mirrored cameras in drawings flipped left to right. That describes the same object
     as well: about z = 0 because it is symmetric, along x because a mirrored object is an object too. The network
     answers each of the four descriptions a little differently; the volume is the mean of its latest answers, and
-    each next round's prior.
+    each next round's prior. What is handed out has every outline filled besides (`outlines.py`).
     """
 
     def __init__(self, net: CompactNet, device: torch.device) -> None:
@@ -66,7 +67,7 @@ class CompactModel:
                 readings[look] = self._read(reduce(Sketches.mirrored, look, sketches))
             answers[look] = self._decide(readings[look], evidence, mean, len(sketches), flip=0 in look)
             mean = torch.stack([*answers.values()]).mean(dim=0)
-            yield _array(torch.cat([mean.flip(3), mean], dim=3)[0])
+            yield heed_outlines(_array(torch.cat([mean.flip(3), mean], dim=3)[0]), sketches)
 
     @torch.inference_mode()
     def _read(self, sketches: Sketches) -> Tensor:

@@ -1,0 +1,59 @@
+"""What every outline demands of the solid: to be covered where it is drawn, and empty beyond.
+
+A network weighs probabilities voxel by voxel, and nothing makes it say "somewhere along this ray": where it knows that
+there is something and not how deep, each voxel may stay below one half and the solid has a hole. Its probabilities
+still say where along the ray the solid is most likely, so that is where it is raised.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from sketchcore import _core
+from sketchcore.nets.sketches import Sketches
+
+Volume = NDArray[np.float32]
+
+BORDER = 128
+"""The signed distance of an outline, in `Sketches.fields` and `Sketches.evidence`; 8 a pixel more inside."""
+PIXEL = 8
+MARGIN = 0.4
+"""How far beyond 0 the logits are moved, for the surface is interpolated between voxels."""
+LIMIT = 2.0
+"""The most that a logit is moved: drawings err, and networks may know better."""
+FAR = 12.0
+"""Logits are between -FAR and FAR."""
+
+
+def heed_outlines(volume: Volume, sketches: Sketches) -> Volume:
+    """The volume with every outline filled as far as its probabilities allow, and what lies beyond one cleared.
+
+    Args:
+        volume: float32 [64, 64, 64] (x, y, z), probability of occupancy, symmetric about z = 0.
+        sketches: the drawings.
+
+    Returns:
+        float32 [64, 64, 64], symmetric as well. No logit moves by more than `LIMIT`.
+    """
+    least = np.float32(1 / (1 + np.exp(FAR)))
+    known = np.clip(volume, least, 1 - least)
+    logits = np.log(known / (1 - known))
+    missing = np.zeros_like(logits)
+    for field, camera in zip(sketches.fields, sketches.cameras, strict=True):
+        inside = field[:, :, 0].reshape(64, 4, 64, 4).min(axis=(1, 3)) >= BORDER
+        # Zero is what lies outside the grid: there is nothing.
+        along = _core.to_camera_grid(logits[None] + np.float32(FAR), camera[None])[0].max(axis=0) - np.float32(FAR)
+        lack = gaussian_filter(np.clip(MARGIN - along, 0, LIMIT) * inside, 0.7)
+        each = np.zeros_like(logits)
+        spread = np.ascontiguousarray(np.broadcast_to(lack, (1, 64, 64, 64)))
+        _core.to_world_grid(spread, camera[None], each[None])
+        missing = np.maximum(missing, each)
+    missing = np.maximum(missing, missing[:, :, ::-1])
+    hull = sketches.evidence[0]
+    hull = np.concatenate([hull[:, :, ::-1], hull], axis=2)
+    raised = logits + np.where(hull >= BORDER - PIXEL, missing, 0)
+    cut = np.where(hull < BORDER - 2 * PIXEL, np.clip(logits + MARGIN, 0, LIMIT), 0)
+    moved: Volume = (1 / (1 + np.exp(cut - raised))).astype(np.float32)
+    return moved
