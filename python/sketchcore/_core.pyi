@@ -1,5 +1,7 @@
 """The Rust kernels. Arrays are C-contiguous; cameras and shapes are packed (`Camera.packed`, `Shape.packed`)."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -60,6 +62,7 @@ def generate(
     drawings: NDArray[np.uint8],
     world: NDArray[np.uint8],
     frusta: NDArray[np.uint8],
+    progress: Callable[[int], object] | None = None,
 ) -> tuple[list[NDArray[np.float64]], NDArray[np.float64]]: ...
 def bilateral(
     vertices: NDArray[np.float64],
