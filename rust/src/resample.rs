@@ -35,7 +35,8 @@ pub fn to_world_grid(volumes: &[f32], cameras: &[Camera], out: &mut [f32]) -> Re
 
 type FillPlane = fn(&Padded, &Camera, usize, &mut Plane);
 
-/// Fills the planes of all grids side by side.
+/// Fills the planes of all grids side by side. A single grid is left to the calling thread: to wake others would take
+/// as long as what they would spare it.
 fn each_plane(
     volumes: &[f32],
     cameras: &[Camera],
@@ -43,17 +44,26 @@ fn each_plane(
     fill_plane: FillPlane,
 ) -> Result<(), CoreError> {
     assert_eq!((volumes.len(), out.len()), (cameras.len() * CELLS, cameras.len() * CELLS));
-    let grids = volumes.par_chunks_exact(CELLS).zip(out.par_chunks_exact_mut(CELLS)).zip(cameras);
-    grids.try_for_each(|((volume, out), camera)| {
+    let fill_grid = |((volume, out), camera): ((&[f32; CELLS], &mut [f32; CELLS]), &Camera)| {
         let mut padded = SPARE.take().unwrap_or_default();
-        let finite = pad(volume.as_array().expect("a volume is 64^3 cells"), &mut padded);
+        let finite = pad(volume, &mut padded);
         if finite {
-            let planes = out.as_chunks_mut().0.as_chunks_mut().0;
-            planes.par_iter_mut().enumerate().for_each(|(i, plane)| fill_plane(&padded, camera, i, plane));
+            let planes: &mut [Plane] = out.as_chunks_mut().0.as_chunks_mut().0;
+            let fill = |(i, plane): (usize, &mut Plane)| fill_plane(&padded, camera, i, plane);
+            if cameras.len() == 1 {
+                planes.iter_mut().enumerate().for_each(fill);
+            } else {
+                planes.par_iter_mut().enumerate().for_each(fill);
+            }
         }
         SPARE.set(Some(padded));
         if finite { Ok(()) } else { Err(CoreError::NotFinite { what: "volume" }) }
-    })
+    };
+    let (volumes, out) = (volumes.as_chunks().0, out.as_chunks_mut().0);
+    if cameras.len() == 1 {
+        return volumes.iter().zip(out).zip(cameras).try_for_each(fill_grid);
+    }
+    volumes.par_iter().zip(out).zip(cameras).try_for_each(fill_grid)
 }
 
 thread_local! {
@@ -179,7 +189,7 @@ impl Runs {
     #[inline(always)]
     fn of(&self, line: usize) -> Range<usize> {
         let (first, last) = (self.first[line], self.last[line]);
-        if !(first <= last) {
+        if first > last {
             return 0..0;
         }
         let whole = first as usize;
@@ -258,7 +268,7 @@ mod tests {
         #[test]
         fn every_instruction_set_reads_the_same(camera in any_camera(), plane in 0..SIDE) {
             let mut padded = Padded::default();
-            prop_assert!(padded.fill(noise().as_array().unwrap()));
+            prop_assert!(padded.fill(noise().first_chunk().unwrap()));
             let mut chosen = [[0.25; SIDE]; SIDE];
             let mut plain = chosen;
             camera_plane(&padded, &camera, plane, &mut chosen);
@@ -275,7 +285,7 @@ mod tests {
         let (volume, camera) = (noise(), Camera::orbit(0.0, 0.0, 0.0, 2.0));
         let mut taps = crate::trilinear::Taps::default();
         let mut padded = Padded::default();
-        assert!(padded.fill(volume.as_array().unwrap()));
+        assert!(padded.fill(volume.first_chunk().unwrap()));
         for i in [0, 1, 62, 63] {
             let mut read = [9.0; SIDE];
             taps.fill(|k| [i as f32 + 1.0, (63 - i) as f32 + 1.0, k as f32 + 1.0]);
