@@ -52,6 +52,7 @@ demo: $(BUILT)
 	$(BIN)/python examples/demo.py
 
 bench: $(BUILT)
+	cargo bench --quiet
 	$(BIN)/pytest --quiet benches
 
 clean:

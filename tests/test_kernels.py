@@ -300,3 +300,65 @@ def test_into_must_be_writeable_and_an_array_of_its_own():
         call("to_world_grid", into=into)
     with pytest.raises((TypeError, ValueError), match="borrowed"):
         call("to_world_grid", into=VOLUMES)
+
+
+OUT = {
+    "voxelize": (lambda out: voxelize(SHAPE, out), voxelize(SHAPE)),
+    "draw": (lambda out: draw(SHAPE, FRONT, out), draw(SHAPE, FRONT)),
+    "to_camera_grid": (lambda out: to_camera_grid(VOLUMES[0], FRONT, out), to_camera_grid(VOLUMES[0], FRONT)),
+    "to_world_grid": (
+        lambda out: to_world_grid(VOLUMES[0], FRONT, VOLUMES[1], out),
+        to_world_grid(VOLUMES[0], FRONT, VOLUMES[1]),
+    ),
+    "to_camera_grid of a batch": (
+        lambda out: to_camera_grid(VOLUMES, [FRONT] * 2, out=out),
+        to_camera_grid(VOLUMES, [FRONT] * 2),
+    ),
+    "to_world_grid of a batch": (
+        lambda out: to_world_grid(VOLUMES, [FRONT] * 2, out=out),
+        to_world_grid(VOLUMES, [FRONT] * 2),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", OUT)
+def test_out_is_written_whole_and_returned(name):
+    function, expected = OUT[name]
+    out = np.full_like(expected, 77)
+    assert function(out) is out
+    np.testing.assert_array_equal(out, expected)
+
+
+@pytest.mark.parametrize("name", OUT)
+def test_an_out_that_does_not_fit_is_refused(name):
+    function, expected = OUT[name]
+    dtype = str(expected.dtype)
+    for wrong in (expected.astype(np.int16), expected.tolist()):
+        with pytest.raises(TypeError, match=f"out must be a {dtype} array"):
+            function(wrong)
+    with pytest.raises(ValueError, match=r"out must have shape \[.*, got \["):
+        function(np.zeros((*expected.shape, 1), dtype))
+    frozen = expected.copy()
+    frozen.flags.writeable = False
+    for wrong in (np.repeat(expected, 2, -1)[..., ::2], np.asfortranarray(expected), frozen):
+        with pytest.raises(ValueError, match="out must be C-contiguous and writeable"):
+            function(wrong)
+
+
+def test_out_may_be_into_but_not_the_volume():
+    into = VOLUMES[1].copy()
+    assert to_world_grid(VOLUMES[0], FRONT, into, out=into) is into
+    np.testing.assert_array_equal(into, OUT["to_world_grid"][1])
+    both = VOLUMES.copy()
+    for function in (to_camera_grid, to_world_grid):
+        with pytest.raises(ValueError, match="out must not overlap volume"):
+            function(both[0], FRONT, out=both[0])
+
+
+def test_the_core_refuses_an_out_that_does_not_fit():
+    with pytest.raises(ValueError, match=r"out must have shape \[64, 64, 64\], got \[64, 64\]"):
+        _core.voxelize(ROWS, np.zeros((64, 64), np.uint8))
+    with pytest.raises(ValueError, match=r"out must have shape \[2, 64, 64, 64\], got \[1, "):
+        _core.to_camera_grid(VOLUMES, CAMERAS, VOLUMES[:1].copy())
+    with pytest.raises(ValueError, match="out must be C-contiguous"):
+        _core.draw(ROWS, CAMERA, np.zeros((256, 512), np.uint8)[:, ::2])

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from sketchcore import _core
 from sketchcore.camera import Camera, pack_cameras
+from sketchcore.destination import destination
 from sketchcore.shape import Shape
 
 SIDE = 64
@@ -27,13 +28,18 @@ def _as_camera(camera: object) -> Camera:
     raise TypeError(f"expected a sketchcore.Camera, got {type(camera).__name__}")
 
 
-def voxelize(shape: Shape) -> NDArray[np.uint8]:
+def voxelize(shape: Shape, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
     """The world grid of a shape as it stands: uint8 [64, 64, 64] (x, y, z), 1 where a voxel's centre is inside.
 
+    Args:
+        shape: the shape.
+        out: an array of the result's shape and dtype to write into, and to return.
+
     Raises:
-        TypeError: for anything but a `Shape`.
+        ValueError: for an `out` of another shape, not C-contiguous or not writeable.
+        TypeError: for anything but a `Shape`, or an `out` of another dtype.
     """
-    return _core.voxelize(_as_shape(shape).packed)
+    return _core.voxelize(_as_shape(shape).packed, destination(out, (SIDE,) * 3, np.uint8))
 
 
 def frustum(shape: Shape, camera: Camera, rays: int = 4) -> NDArray[np.uint8]:
@@ -62,14 +68,20 @@ def buffers(shape: Shape, camera: Camera, size: int = IMAGE) -> tuple[NDArray[np
     return _core.buffers(_as_shape(shape).packed, _as_camera(camera).packed, size)
 
 
-def draw(shape: Shape, camera: Camera) -> NDArray[np.uint8]:
+def draw(shape: Shape, camera: Camera, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
     """The line drawing of a shape, uint8 [256, 256], ink 255 on 0 (Saito and Takahashi; paper, section 4.2).
 
+    Args:
+        shape: the shape.
+        camera: where it is seen from.
+        out: an array of the result's shape and dtype to write into, and to return.
+
     Raises:
-        ValueError: if the camera stands inside the shape.
-        TypeError: for anything but a `Shape` and a `Camera`.
+        ValueError: if the camera stands inside the shape, or for an `out` of another shape, not C-contiguous or not
+            writeable.
+        TypeError: for anything but a `Shape` and a `Camera`, or an `out` of another dtype.
     """
-    return _core.draw(_as_shape(shape).packed, _as_camera(camera).packed)
+    return _core.draw(_as_shape(shape).packed, _as_camera(camera).packed, destination(out, (IMAGE,) * 2, np.uint8))
 
 
 def _as_volumes(volume: NDArray[np.floating], name: str) -> NDArray[np.float32]:
@@ -87,29 +99,46 @@ def _as_cameras(camera: Camera | Sequence[Camera], batch: bool) -> NDArray[np.fl
     return pack_cameras([camera] if isinstance(camera, Camera) else camera)
 
 
-def to_camera_grid(volume: NDArray[np.floating], camera: Camera | Sequence[Camera]) -> NDArray[np.float32]:
+def _as_out(
+    out: NDArray[np.float32] | None, volume: NDArray[np.floating], read: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Where a grid for each volume goes, [n, 64, 64, 64]; `out` has the volume's shape."""
+    made = destination(out, np.shape(volume), np.float32)
+    if np.may_share_memory(made, read):
+        raise ValueError("out must not overlap volume: each cell is read from many places")
+    return made.reshape(read.shape)
+
+
+def to_camera_grid(
+    volume: NDArray[np.floating], camera: Camera | Sequence[Camera], out: NDArray[np.float32] | None = None
+) -> NDArray[np.float32]:
     """Resamples world volumes into camera grids, trilinear, 0 outside the world grid.
 
     Args:
         volume: [64, 64, 64] (x, y, z), or a batch [n, 64, 64, 64].
         camera: one camera, or n of them for a batch.
+        out: a float32 array of the volume's shape to write into, and to return.
 
     Returns:
         float32 of the same shape (depth, row, col).
 
     Raises:
-        ValueError: for a wrong shape, a number of cameras that differs from that of volumes, NaN or infinity.
-        TypeError: for what is no volume or no camera.
+        ValueError: for a wrong shape, a number of cameras that differs from that of volumes, NaN or infinity, or an
+            `out` that is not C-contiguous, not writeable or overlaps the volume.
+        TypeError: for what is no volume or no camera, or an `out` of another dtype.
     """
-    batch = np.ndim(volume) == 4
-    grids = _core.to_camera_grid(_as_volumes(volume, "volume"), _as_cameras(camera, batch))
-    return grids if batch else grids[0]
+    volumes = _as_volumes(volume, "volume")
+    cameras = _as_cameras(camera, np.ndim(volume) == 4)
+    result = _as_out(out, volume, volumes)
+    _core.to_camera_grid(volumes, cameras, result)
+    return result.reshape(np.shape(volume)) if out is None else out
 
 
 def to_world_grid(
     volume: NDArray[np.floating],
     camera: Camera | Sequence[Camera],
     into: NDArray[np.floating] | None = None,
+    out: NDArray[np.float32] | None = None,
 ) -> NDArray[np.float32]:
     """Resamples camera grids into world volumes, trilinear; voxels outside the frustum keep `into`, or 0.
 
@@ -117,21 +146,26 @@ def to_world_grid(
         volume: [64, 64, 64] (depth, row, col), or a batch [n, 64, 64, 64].
         camera: one camera, or n of them for a batch.
         into: what holds outside the frustum, the shape of `volume` (x, y, z); it is left as it is.
+        out: a float32 array of the volume's shape to write into, and to return; `into` itself to change it in place.
 
     Returns:
         float32 of the same shape (x, y, z).
 
     Raises:
-        ValueError: for a wrong shape, a number of cameras that differs from that of volumes, NaN or infinity.
-        TypeError: for what is no volume or no camera.
+        ValueError: for a wrong shape, a number of cameras that differs from that of volumes, NaN or infinity, or an
+            `out` that is not C-contiguous, not writeable or overlaps the volume.
+        TypeError: for what is no volume or no camera, or an `out` of another dtype.
     """
-    batch = np.ndim(volume) == 4
     volumes = _as_volumes(volume, "volume")
+    cameras = _as_cameras(camera, np.ndim(volume) == 4)
     if into is not None and np.shape(into) != np.shape(volume):
         raise ValueError(f"into must have the volume's shape {list(np.shape(volume))}, got {list(np.shape(into))}")
-    result = np.zeros_like(volumes) if into is None else _as_volumes(into, "into").copy()
-    _core.to_world_grid(volumes, _as_cameras(camera, batch), result)
-    return result if batch else result[0]
+    outside = 0.0 if into is None else _as_volumes(into, "into")
+    result = _as_out(out, volume, volumes)
+    if out is None or out is not into:
+        np.copyto(result, outside)
+    _core.to_world_grid(volumes, cameras, result)
+    return result.reshape(np.shape(volume)) if out is None else out
 
 
 def as_drawings(drawings: NDArray[np.uint8] | Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:

@@ -12,6 +12,7 @@ use crate::voxel::CELLS;
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 
 /// Everything that a sample depends on beside seed and index.
 #[derive(Clone, Debug, Serialize, Deserialize, PartialEq)]
@@ -174,17 +175,44 @@ pub fn sample(
     Ok((shape, cameras.into_iter().map(|(_, camera)| camera).collect()))
 }
 
+/// How far a batch is, for those who wait for it, and their means to stop it.
+#[derive(Default)]
+pub struct Watch {
+    finished: AtomicUsize,
+    stopped: AtomicBool,
+}
+
+impl Watch {
+    /// Samples finished so far.
+    pub fn finished(&self) -> usize {
+        self.finished.load(Relaxed)
+    }
+
+    /// Lets the samples that are being made be the last; the batch is [`CoreError::Stopped`].
+    pub fn stop(&self) {
+        self.stopped.store(true, Relaxed);
+    }
+}
+
 /// Makes samples `first ..`, one a slot, on the threads of the current rayon pool.
 pub fn batch(
     config: &SampleConfig,
     seed: u64,
     first: u64,
     slots: Vec<Slot>,
+    watch: &Watch,
 ) -> Result<Vec<(Shape, Vec<Camera>)>, CoreError> {
     slots
         .into_par_iter()
         .enumerate()
-        .map(|(i, slot)| sample(config, seed, first.wrapping_add(i as u64), slot))
+        .map(|(i, slot)| {
+            if watch.stopped.load(Relaxed) {
+                return Err(CoreError::Stopped);
+            }
+            let made = sample(config, seed, first.wrapping_add(i as u64), slot)?;
+            watch.finished.fetch_add(1, Relaxed);
+            Ok(made)
+        })
         .collect()
 }
 
@@ -329,6 +357,22 @@ mod tests {
                 assert!(frustum.contains(&255));
             }
         }
+    }
+
+    #[test]
+    fn a_batch_says_how_far_it_is_and_can_be_stopped() {
+        let mut arrays = vec![(vec![0; IMAGE * IMAGE], vec![0; CELLS], vec![0; CELLS]); 3];
+        let mut run = |watch: &Watch| {
+            let slots = arrays.iter_mut().map(|(drawings, world, frusta)| Slot { drawings, world, frusta });
+            batch(&SampleConfig::default(), 3, 0, slots.collect(), watch)
+        };
+        let watch = Watch::default();
+        assert_eq!(run(&watch).unwrap().len(), 3);
+        assert_eq!(watch.finished(), 3);
+        let watch = Watch::default();
+        watch.stop();
+        assert_eq!(run(&watch).unwrap_err(), CoreError::Stopped);
+        assert_eq!(watch.finished(), 0);
     }
 
     #[test]

@@ -39,4 +39,6 @@ pub enum CoreError {
     NoShape { attempts: u32 },
     #[error("could not start {threads} threads: {reason}")]
     Threads { threads: usize, reason: String },
+    #[error("the batch was stopped before it was finished")]
+    Stopped,
 }

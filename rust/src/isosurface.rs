@@ -2,7 +2,7 @@
 
 use crate::buffers::Buffers;
 use crate::camera::Camera;
-use crate::resample::trilinear;
+use crate::trilinear::trilinear;
 use crate::voxel::{CELLS, SIDE};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;

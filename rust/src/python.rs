@@ -4,6 +4,7 @@
 mod arrays;
 mod drawings;
 mod lift;
+mod pools;
 mod samples;
 mod views;
 mod volumes;
@@ -16,7 +17,7 @@ use pyo3::prelude::*;
 impl From<CoreError> for PyErr {
     fn from(error: CoreError) -> Self {
         match error {
-            CoreError::Threads { .. } | CoreError::NoShape { .. } => {
+            CoreError::Threads { .. } | CoreError::NoShape { .. } | CoreError::Stopped => {
                 PyRuntimeError::new_err(error.to_string())
             }
             _ => PyValueError::new_err(error.to_string()),

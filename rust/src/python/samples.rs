@@ -1,12 +1,16 @@
 //! Whole samples, in parallel.
 
 use super::arrays::checked_mut;
-use crate::batch::{SampleConfig, Slot, batch};
+use super::pools::pool;
+use crate::batch::{SampleConfig, Slot, Watch, batch};
 use crate::camera::{Camera, IMAGE, PACKED, VIEWPOINTS};
 use crate::error::CoreError;
 use crate::voxel::{CELLS, SIDE};
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadwriteArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use rayon::Scope;
+use std::sync::mpsc::channel;
+use std::time::Duration;
 
 #[pyfunction]
 pub fn default_config() -> String {
@@ -16,6 +20,7 @@ pub fn default_config() -> String {
 type Made<'py> = (Vec<Bound<'py, PyArray2<f64>>>, Bound<'py, PyArray3<f64>>);
 
 #[pyfunction]
+#[pyo3(signature = (config, seed, first, threads, drawings, world, frusta, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "the arrays of a batch, each by name")]
 pub fn generate<'py>(
     py: Python<'py>,
@@ -26,6 +31,7 @@ pub fn generate<'py>(
     mut drawings: PyReadwriteArrayDyn<'py, u8>,
     mut world: PyReadwriteArrayDyn<'py, u8>,
     mut frusta: PyReadwriteArrayDyn<'py, u8>,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<Made<'py>> {
     let config = SampleConfig::from_json(config)?;
     let (image, side) = (IMAGE as isize, SIDE as isize);
@@ -43,13 +49,16 @@ pub fn generate<'py>(
         .zip(frusta.chunks_exact_mut(views * CELLS))
         .map(|((drawings, world), frusta)| Slot { drawings, world, frusta })
         .collect();
-    let made = py.detach(|| match threads {
-        None => batch(&config, seed, first, slots),
-        Some(threads) => rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .map_err(|e| CoreError::Threads { threads, reason: e.to_string() })?
-            .install(|| batch(&config, seed, first, slots)),
+    let watch = Watch::default();
+    let made = py.detach(|| {
+        let work = || batch(&config, seed, first, slots, &watch);
+        match threads {
+            None => rayon::in_place_scope(|scope| watched(scope, work, &watch, progress.as_ref())),
+            Some(threads) => {
+                let pool = pool(threads)?;
+                pool.in_place_scope(|scope| watched(scope, work, &watch, progress.as_ref()))
+            }
+        }
     })?;
     let packed: Vec<f64> =
         made.iter().flat_map(|(_, cameras)| cameras.iter().flat_map(Camera::to_packed)).collect();
@@ -60,4 +69,49 @@ pub fn generate<'py>(
         rows.into_flattened().into_pyarray(py).reshape([count, 8])
     });
     Ok((shapes.collect::<PyResult<_>>()?, cameras))
+}
+
+/// How often the calling thread looks for signals and says how far the work is.
+const TICK: Duration = Duration::from_millis(50);
+
+/// Has the pool of `scope` do the work, while the calling thread minds Python: a signal (Ctrl-C), or an exception that
+/// `progress` raises, stops the work and is raised when the last thread has left it.
+fn watched<'scope, T: Send + 'scope>(
+    scope: &Scope<'scope>,
+    work: impl FnOnce() -> Result<T, CoreError> + Send + 'scope,
+    watch: &Watch,
+    progress: Option<&Py<PyAny>>,
+) -> PyResult<T> {
+    let (sender, receiver) = channel();
+    // Nobody listens any more only where the calling thread panics.
+    scope.spawn(move |_| drop(sender.send(work())));
+    let mut said = 0;
+    let mut tell = |py: Python<'_>| {
+        let finished = watch.finished();
+        match progress {
+            Some(progress) if finished != said => {
+                said = finished;
+                progress.call1(py, (finished,)).map(drop)
+            }
+            _ => Ok(()),
+        }
+    };
+    loop {
+        match receiver.recv_timeout(TICK) {
+            Ok(result) => {
+                let made = result?;
+                Python::attach(tell)?;
+                return Ok(made);
+            }
+            Err(_) => {
+                let halted = Python::attach(|py| py.check_signals().and_then(|()| tell(py)));
+                if let Err(error) = halted {
+                    watch.stop();
+                    // The last samples end, and their result with them.
+                    drop(receiver.recv());
+                    return Err(error);
+                }
+            }
+        }
+    }
 }

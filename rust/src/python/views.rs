@@ -1,6 +1,6 @@
 //! What a camera sees of a shape or of a volume.
 
-use super::arrays::{all_finite, camera_of, check_size, checked, grid, shape_of};
+use super::arrays::{all_finite, camera_of, check_size, checked, filled, grid, shape_of};
 use crate::buffers::{Buffers, fill_frustum};
 use crate::camera::{Camera, DISTANCE, IMAGE, PACKED, VIEWPOINTS};
 use crate::lines::{LineConfig, detect};
@@ -98,13 +98,13 @@ pub fn lines<'py>(
 }
 
 #[pyfunction]
+#[pyo3(signature = (shape, camera, out=None))]
 pub fn draw<'py>(
     py: Python<'py>,
     shape: PyReadonlyArrayDyn<'py, f64>,
     camera: PyReadonlyArrayDyn<'py, f64>,
-) -> PyResult<Bound<'py, PyArray2<u8>>> {
+    out: Option<Bound<'py, PyArrayDyn<u8>>>,
+) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
     let (shape, camera) = (shape_of(&shape)?, camera_of(&camera)?);
-    let mut drawing = vec![0; IMAGE * IMAGE];
-    py.detach(|| crate::batch::draw(&shape, &camera, &LineConfig::default(), &mut drawing))?;
-    drawing.into_pyarray(py).reshape([IMAGE, IMAGE])
+    filled(py, out, &[IMAGE; 2], |out| crate::batch::draw(&shape, &camera, &LineConfig::default(), out))
 }

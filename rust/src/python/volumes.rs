@@ -1,43 +1,39 @@
 //! Volumes: made of a shape, read in another grid, and the surface that leaves the package.
 
-use super::arrays::{GRIDS, all_finite, cameras_of, checked, checked_mut, grid, same_count, shape_of};
+use super::arrays::{GRIDS, all_finite, cameras_of, checked, checked_mut, filled, same_count, shape_of};
 use crate::mesh::BilateralSettings;
 use crate::resample;
-use crate::voxel::{BitGrid, CELLS};
+use crate::voxel::{BitGrid, CELLS, SIDE};
 use numpy::{IntoPyArray, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
-use rayon::prelude::*;
 
 #[pyfunction]
+#[pyo3(signature = (shape, out=None))]
 pub fn voxelize<'py>(
     py: Python<'py>,
     shape: PyReadonlyArrayDyn<'py, f64>,
+    out: Option<Bound<'py, PyArrayDyn<u8>>>,
 ) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
     let shape = shape_of(&shape)?;
-    let voxels = py.detach(|| {
-        let mut bytes = vec![0; CELLS];
-        BitGrid::of_shape(&shape).write_bytes(&mut bytes);
-        bytes
-    });
-    grid(py, voxels, &[])
+    filled(py, out, &[SIDE; 3], |voxels| {
+        BitGrid::of_shape(&shape).write_bytes(voxels);
+        Ok(())
+    })
 }
 
 #[pyfunction]
+#[pyo3(signature = (volumes, cameras, out=None))]
 pub fn to_camera_grid<'py>(
     py: Python<'py>,
     volumes: PyReadonlyArrayDyn<'py, f32>,
     cameras: PyReadonlyArrayDyn<'py, f64>,
+    out: Option<Bound<'py, PyArrayDyn<f32>>>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
     let cameras = cameras_of(&cameras)?;
     let volumes = checked(&volumes, "volumes", &GRIDS)?;
-    all_finite(volumes, "volume")?;
     same_count("cameras", cameras.len(), volumes.len() / CELLS)?;
-    let mut out = vec![0.0; volumes.len()];
-    py.detach(|| {
-        let jobs = out.par_chunks_mut(CELLS).zip(volumes.par_chunks(CELLS)).zip(&cameras);
-        jobs.for_each(|((out, volume), camera)| resample::to_camera_grid(volume, camera, out));
-    });
-    grid(py, out, &[cameras.len()])
+    let shape = [cameras.len(), SIDE, SIDE, SIDE];
+    filled(py, out, &shape, |out| resample::to_camera_grid(volumes, &cameras, out))
 }
 
 #[pyfunction]
@@ -50,14 +46,10 @@ pub fn to_world_grid<'py>(
     let cameras = cameras_of(&cameras)?;
     let volumes = checked(&volumes, "volumes", &GRIDS)?;
     let into = checked_mut(&mut into, "into", &GRIDS)?;
-    all_finite(volumes, "volume")?;
     all_finite(into, "into")?;
     same_count("cameras", cameras.len(), volumes.len() / CELLS)?;
     same_count("into", into.len() / CELLS, cameras.len())?;
-    py.detach(|| {
-        let jobs = into.par_chunks_mut(CELLS).zip(volumes.par_chunks(CELLS)).zip(&cameras);
-        jobs.for_each(|((into, volume), camera)| resample::to_world_grid(volume, camera, into));
-    });
+    py.detach(|| resample::to_world_grid(volumes, &cameras, into))?;
     Ok(())
 }
 
