@@ -21,6 +21,7 @@ pub mod buffers;
 pub mod camera;
 pub mod carve;
 pub mod csg;
+mod dispatch;
 pub mod distance;
 pub mod error;
 pub mod evidence;

@@ -14,11 +14,7 @@ pub fn voxelize<'py>(
     shape: PyReadonlyArrayDyn<'py, f64>,
 ) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
     let shape = shape_of(&shape)?;
-    let voxels = py.detach(|| {
-        let mut bytes = vec![0; CELLS];
-        BitGrid::of_shape(&shape).write_bytes(&mut bytes);
-        bytes
-    });
+    let voxels = py.detach(|| BitGrid::of_shape(&shape).to_bytes());
     grid(py, voxels, &[])
 }
 
