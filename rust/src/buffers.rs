@@ -2,118 +2,184 @@
 
 use crate::camera::Camera;
 use crate::csg::Shape;
+use crate::dispatch::dispatched;
 use crate::error::CoreError;
-use crate::raycast::RayCaster;
+use crate::raycast::{RAYS, RayCaster, TILE, Tile};
 use crate::voxel::{CELLS, SIDE};
 
 /// What a camera sees of a shape, pixel by pixel, row by row.
 pub struct Buffers {
     /// Depth along the camera's z axis in world units; infinite where nothing is seen.
     pub depth: Vec<f32>,
-    /// Unit normal in the world, towards the eye; zero where nothing is seen.
-    pub normal: Vec<[f32; 3]>,
+    /// Unit normal in the world, towards the eye, by its components; zero where nothing is seen.
+    pub normal: [Vec<f32>; 3],
     /// Pixels along each side.
     pub size: usize,
 }
 
-/// Pixels along each side of the tiles that share a list of primitives.
-const TILE: usize = 8;
-
 impl Buffers {
     /// Casts one ray through the middle of each pixel.
     pub fn of_shape(shape: &Shape, camera: &Camera, size: usize) -> Result<Self, CoreError> {
-        refuse_eye_inside(shape, camera)?;
-        let caster = RayCaster::new(shape, camera);
-        let mut depth = vec![f32::INFINITY; size * size];
-        let mut normal = vec![[0.0; 3]; size * size];
-        let (mut candidates, mut spans) = (Vec::new(), Vec::new());
-        let at = |i: usize| (2 * i + 1) as f64 / size as f64 - 1.0;
+        let caster = RayCaster::new(shape, camera)?;
+        let depth = vec![f32::INFINITY; size * size];
+        let normal = [(); 3].map(|()| vec![0.0; size * size]);
+        let mut buffers = Self { depth, normal, size };
+        cast_image(&caster, &mut buffers);
+        Ok(buffers)
+    }
+}
+
+dispatched! {
+    fn cast_image(caster: &RayCaster, buffers: &mut Buffers) {
+        let size = buffers.size;
+        let mut tile = Tile::new(caster);
         for top in (0..size).step_by(TILE) {
-            let bottom = (top + TILE).min(size);
-            for left in (0..size).step_by(TILE) {
-                let right = (left + TILE).min(size);
-                caster.visible((at(left), at(right - 1)), (at(top), at(bottom - 1)), &mut candidates);
-                if candidates.is_empty() {
-                    continue;
-                }
-                for row in top..bottom {
-                    for col in left..right {
-                        let direction = camera.ray(at(col), at(row));
-                        caster.spans(direction, &candidates, &mut spans);
-                        if let Some(hit) = spans.first() {
-                            let n = caster.normal(hit.entry, direction, hit.start);
-                            depth[row * size + col] = hit.start as f32;
-                            normal[row * size + col] = n.as_vec3().to_array();
-                        }
+            cast_row(caster, &mut tile, size, top, |left, depth, normal| {
+                let all = buffers.normal.iter_mut().zip(normal).chain([(&mut buffers.depth, depth)]);
+                for (out, lanes) in all {
+                    for (row, lanes) in (top..size).zip(lanes.as_chunks::<TILE>().0) {
+                        let out = &mut out[row * size + left..(row + 1) * size];
+                        out.iter_mut().zip(lanes).for_each(|(out, &lane)| *out = lane);
                     }
                 }
-            }
+            });
         }
-        Ok(Self { depth, normal, size })
     }
+}
+
+/// Casts a row of tiles, `top` the first row of its pixels, and gives each that sees something to `write`: its first
+/// column, depths and normals.
+#[inline(always)]
+pub fn cast_row(
+    caster: &RayCaster,
+    tile: &mut Tile,
+    size: usize,
+    top: usize,
+    mut write: impl FnMut(usize, &[f32; RAYS], &[[f32; RAYS]; 3]),
+) {
+    let ys = image_points(top, size);
+    for left in (0..size).step_by(TILE) {
+        if tile.cast(caster, &image_points(left, size), &ys) {
+            let hits = tile.entries(None);
+            let (depth, normals) = (hits.depth(), tile.normals(caster, &hits));
+            let mut narrow = [[0.0; RAYS]; 4];
+            for (narrow, wide) in narrow.iter_mut().zip([&depth, &normals[0], &normals[1], &normals[2]]) {
+                narrow.iter_mut().zip(wide).for_each(|(narrow, &wide)| *narrow = wide as f32);
+            }
+            let [depth, normals @ ..] = &narrow;
+            write(left, depth, normals);
+        }
+    }
+}
+
+/// The middles of `TILE` pixels from `first` on, of `size` along the side of the image, in [-1, 1] units.
+#[inline(always)]
+fn image_points(first: usize, size: usize) -> [f64; TILE] {
+    std::array::from_fn(|i| (2 * (first + i).min(size - 1) + 1) as f64 / size as f64 - 1.0)
 }
 
 /// The share of each camera-grid cell that is inside the shape, 255 for all of it, in the order (slice, row, col).
 ///
 /// Exact along depth; across the image by `rays` x `rays` rays a cell.
 pub fn fill_frustum(shape: &Shape, camera: &Camera, rays: usize, out: &mut [u8]) -> Result<(), CoreError> {
-    refuse_eye_inside(shape, camera)?;
     assert_eq!(out.len(), CELLS);
-    let caster = RayCaster::new(shape, camera);
+    let caster = RayCaster::new(shape, camera)?;
+    out.fill(0);
+    fill_cells(&caster, rays, out);
+    Ok(())
+}
+
+dispatched! {
+    fn fill_cells(caster: &RayCaster, rays: usize, out: &mut [u8]) {
+        fill_tiles(caster, rays, out);
+    }
+}
+
+/// Squares of cells, as many as one tile of rays holds, or one cell by several tiles.
+#[inline(always)]
+fn fill_tiles(caster: &RayCaster, rays: usize, out: &mut [u8]) {
+    let size = SIDE * rays;
+    let side = (TILE / rays).max(1);
+    let camera = caster.camera();
     let per_slice = SIDE as f64 / (camera.far - camera.near);
     let full = 255.0 / (rays * rays) as f64;
-    let at = |i: usize| (2 * i + 1) as f64 / (SIDE * rays) as f64 - 1.0;
-    let (mut candidates, mut spans) = (Vec::new(), Vec::new());
-    out.fill(0);
-    for row in 0..SIDE {
-        let ys = (at(row * rays), at(row * rays + rays - 1));
-        for col in 0..SIDE {
-            let xs = (at(col * rays), at(col * rays + rays - 1));
-            caster.visible(xs, ys, &mut candidates);
-            if candidates.is_empty() {
-                continue;
-            }
-            let mut inside = [0.0f64; SIDE];
-            for y in 0..rays {
-                for x in 0..rays {
-                    let direction = camera.ray(at(col * rays + x), at(row * rays + y));
-                    caster.spans(direction, &candidates, &mut spans);
-                    for span in &spans {
-                        let from = (span.start - camera.near) * per_slice;
-                        let to = (span.end - camera.near) * per_slice;
-                        cover(&mut inside, from, to);
+    let mut tile = Tile::new(caster);
+    // For each slice and cell, how much more of it is inside than of the slice behind it.
+    let mut gains = [0.0; (SIDE + 1) * RAYS];
+    for top in (0..SIDE).step_by(side) {
+        for left in (0..SIDE).step_by(side) {
+            let mut any = false;
+            for first_row in (0..side * rays).step_by(TILE) {
+                for first_col in (0..side * rays).step_by(TILE) {
+                    let xs = image_points(left * rays + first_col, size);
+                    let ys = image_points(top * rays + first_row, size);
+                    if !tile.cast(caster, &xs, &ys) {
+                        continue;
+                    }
+                    any = true;
+                    let cells: [usize; RAYS] = std::array::from_fn(|r| {
+                        let (row, col) = (first_row + r / TILE, first_col + r % TILE);
+                        let within = row < side * rays && col < side * rays;
+                        if within { row / rays * side + col / rays } else { usize::MAX }
+                    });
+                    let mut from = None;
+                    loop {
+                        let entries = tile.entries(from.as_ref());
+                        if entries.nearness.iter().fold(0, |any, w| any | w.to_bits()) == 0 {
+                            break;
+                        }
+                        let exits = tile.exits(&entries.nearness);
+                        let (start, end) = (entries.depth(), exits.depth());
+                        for r in 0..RAYS {
+                            if start[r] < f64::INFINITY && cells[r] != usize::MAX {
+                                let slices = |depth: f64| (depth - camera.near) * per_slice;
+                                gain(&mut gains, side * side, cells[r], slices(end[r]), 1.0);
+                                gain(&mut gains, side * side, cells[r], slices(start[r]), -1.0);
+                            }
+                        }
+                        from = Some(exits.nearness);
                     }
                 }
             }
-            for (slice, share) in inside.iter().enumerate() {
-                out[(slice * SIDE + row) * SIDE + col] = (share * full).round() as u8;
+            if any {
+                write_cells(&mut gains, side, full, top, left, out);
             }
         }
     }
-    Ok(())
 }
 
-/// Adds to each slice the share of it that lies between two depths, in slices from the near plane.
-fn cover(inside: &mut [f64; SIDE], from: f64, to: f64) {
-    let (from, to) = (from.max(0.0), to.min(SIDE as f64));
-    if from >= to {
-        return;
+/// Adds `sign` to all slices up to `depth` (in slices from the near plane), in part to the one that it lies in.
+#[inline(always)]
+fn gain(gains: &mut [f64], cells: usize, cell: usize, depth: f64, sign: f64) {
+    let depth = depth.clamp(0.0, SIDE as f64);
+    let slice = depth as usize;
+    let part = depth - slice as f64;
+    gains[slice * cells + cell] += sign * part;
+    if slice > 0 {
+        gains[(slice - 1) * cells + cell] += sign * (1.0 - part);
     }
-    let (first, last) = (from as usize, (to as usize).min(SIDE - 1));
-    if first == last {
-        inside[first] += to - from;
-        return;
-    }
-    inside[first] += (first + 1) as f64 - from;
-    inside[first + 1..last].iter_mut().for_each(|s| *s += 1.0);
-    inside[last] += to - last as f64;
 }
 
-fn refuse_eye_inside(shape: &Shape, camera: &Camera) -> Result<(), CoreError> {
-    if shape.contains(camera.position) {
-        return Err(CoreError::EyeInside(camera.position.to_array()));
+/// Sums up the gains of `side` x `side` cells from the far end, and clears them.
+#[inline(always)]
+fn write_cells(gains: &mut [f64], side: usize, full: f64, top: usize, left: usize, out: &mut [u8]) {
+    let cells = side * side;
+    let mut inside = [0.0; RAYS];
+    let mut bytes = [0u8; RAYS];
+    for slice in (0..SIDE + 1).rev() {
+        let gains = &mut gains[slice * cells..][..cells];
+        for ((inside, gain), byte) in inside.iter_mut().zip(gains).zip(&mut bytes) {
+            *inside += *gain;
+            *gain = 0.0;
+            *byte = (*inside * full + 0.5) as u8;
+        }
+        if slice < SIDE {
+            for row in 0..side {
+                let at = (slice * SIDE + top + row) * SIDE + left;
+                out[at..at + side].copy_from_slice(&bytes[row * side..][..side]);
+            }
+        }
     }
-    Ok(())
 }
 
 #[cfg(test)]
@@ -136,7 +202,7 @@ mod tests {
         // The face is 0.6 wide at depth 1.8; the image is 2 * 1.8 * tan(22.5 degrees) there.
         let pixels = 0.6 / (3.6 * 22.5f64.to_radians().tan()) * 256.0;
         assert!((hits.count() as f64 - pixels * pixels).abs() < 4.0 * pixels);
-        assert_eq!(buffers.normal[128 * 256 + 128], [1.0, 0.0, 0.0]);
+        assert_eq!([0, 1, 2].map(|axis| buffers.normal[axis][128 * 256 + 128]), [1.0, 0.0, 0.0]);
     }
 
     #[test]

@@ -5,8 +5,12 @@
 //! beside the background is a line: so outlines are closed, and the background, flooded over its four-connected
 //! neighbours from the border, never gets in.
 
-use crate::buffers::Buffers;
+use crate::buffers::{Buffers, cast_row};
+use crate::camera::{Camera, IMAGE};
+use crate::csg::Shape;
+use crate::dispatch::dispatched;
 use crate::error::CoreError;
+use crate::raycast::{RayCaster, TILE, Tile};
 use serde::{Deserialize, Serialize};
 
 /// When a change of depth or normal is a line.
@@ -38,50 +42,193 @@ impl LineConfig {
     }
 }
 
-/// Marks the lines: `true` where there is ink, row by row.
-pub fn detect(buffers: &Buffers, config: &LineConfig) -> Vec<bool> {
-    let size = buffers.size;
-    let near: Vec<f32> = buffers.depth.iter().map(|d| 1.0 / d).collect();
-    let cos_crease = config.crease_degrees.to_radians().cos();
-    let mut ink = vec![false; size * size];
-    for row in 0..size {
-        for col in 0..size {
-            let i = row * size + col;
-            let here = near[i];
-            if here == 0.0 {
-                continue;
-            }
-            let at = |inside: bool, j: usize| if inside { near[j] } else { 0.0 };
-            let left = at(col > 0, i.wrapping_sub(1));
-            let right = at(col + 1 < size, i + 1);
-            let above = at(row > 0, i.wrapping_sub(size));
-            let below = at(row + 1 < size, i + size);
-            let outline = left == 0.0 || right == 0.0 || above == 0.0 || below == 0.0;
-            let step = (2.0 * here - left - right).max(2.0 * here - above - below);
-            if outline || step > config.depth_step {
-                ink[i] = true;
-            }
-            for (other, j) in [(right, i + 1), (below, i + size)] {
-                if other == 0.0 || dot(buffers.normal[i], buffers.normal[j]) >= cos_crease {
-                    continue;
+/// Draws a shape: 255 where there is ink, 0 elsewhere, row by row.
+pub fn draw(shape: &Shape, camera: &Camera, config: &LineConfig, ink: &mut [u8]) -> Result<(), CoreError> {
+    assert_eq!(ink.len(), IMAGE * IMAGE);
+    draw_seen(&RayCaster::new(shape, camera)?, config, ink);
+    Ok(())
+}
+
+/// Draws an image that has been cast already.
+pub fn detect(buffers: &Buffers, config: &LineConfig, ink: &mut [u8]) {
+    assert_eq!(ink.len(), buffers.size * buffers.size);
+    draw_buffers(buffers, config, ink);
+}
+
+dispatched! {
+    fn draw_seen(caster: &RayCaster, config: &LineConfig, ink: &mut [u8]) {
+        let mut tile = Tile::new(caster);
+        draw_strips(IMAGE, config, ink, |top, strip| {
+            cast_row(caster, &mut tile, IMAGE, top, |left, depth, normal| {
+                for row in 0..TILE {
+                    let lanes = row * TILE..(row + 1) * TILE;
+                    strip.write(row, left, &depth[lanes.clone()], normal.each_ref().map(|n| &n[lanes.clone()]));
                 }
-                // The crease belongs to what is in front; where both are equally far, to the same face all along.
-                let ahead = here - other;
-                let owns = if ahead.abs() > config.depth_step {
-                    ahead > 0.0
-                } else {
-                    dot(buffers.normal[i], FACE_ORDER) >= dot(buffers.normal[j], FACE_ORDER)
-                };
-                ink[if owns { i } else { j }] = true;
+            });
+        });
+    }
+}
+
+dispatched! {
+    fn draw_buffers(buffers: &Buffers, config: &LineConfig, ink: &mut [u8]) {
+        draw_strips(buffers.size, config, ink, |top, strip| {
+            for row in 0..TILE.min(buffers.size - top) {
+                let pixels = (top + row) * buffers.size..(top + row + 1) * buffers.size;
+                let normal = buffers.normal.each_ref().map(|n| &n[pixels.clone()]);
+                strip.write(row, 0, &buffers.depth[pixels.clone()], normal);
             }
+        });
+    }
+}
+
+/// Pixels that are looked at together.
+const BLOCK: usize = 16;
+/// Rows of the strip before whose lines, or whose neighbours' lines, wait for the strip that follows.
+const OVERLAP: usize = 2;
+
+/// Some rows of an image, of what lines are found in; with a pixel of background at both ends of each.
+///
+/// A strip goes through the image from top to bottom, so that it stays in the nearest caches.
+struct Strip {
+    /// From one row to the next.
+    stride: usize,
+    /// Inverse depth; 0 where nothing is seen.
+    near: Vec<f32>,
+    /// Anything where nothing is seen.
+    normal: [Vec<f32>; 3],
+    /// The share of `FACE_ORDER` in the normal.
+    rank: Vec<f32>,
+}
+
+/// Pixels side by side.
+struct Block<'a> {
+    near: &'a [f32; BLOCK],
+    normal: [&'a [f32; BLOCK]; 3],
+    rank: &'a [f32; BLOCK],
+}
+
+impl Strip {
+    fn new(size: usize) -> Self {
+        let stride = size.next_multiple_of(BLOCK) + 2;
+        let blank = vec![0.0; (OVERLAP + TILE) * stride];
+        Self { stride, near: blank.clone(), normal: [(); 3].map(|()| blank.clone()), rank: blank }
+    }
+
+    /// Keeps the last rows as the first, and clears the others.
+    #[inline(always)]
+    fn advance(&mut self) {
+        for values in self.normal.iter_mut().chain([&mut self.near, &mut self.rank]) {
+            values.copy_within(TILE * self.stride.., 0);
+        }
+        self.near[OVERLAP * self.stride..].fill(0.0);
+    }
+
+    /// Puts pixels into one of the new rows, from a column on.
+    #[inline(always)]
+    fn write(&mut self, row: usize, col: usize, depth: &[f32], normal: [&[f32]; 3]) {
+        let from = (OVERLAP + row) * self.stride + 1 + col;
+        let new = from..from + depth.len();
+        self.near[new.clone()].iter_mut().zip(depth).for_each(|(near, depth)| *near = 1.0 / depth);
+        for (own, normal) in self.normal.iter_mut().zip(normal) {
+            own[new.clone()].copy_from_slice(normal);
+        }
+        let ranks = self.rank[new].iter_mut();
+        let normals = normal[0].iter().zip(normal[1]).zip(normal[2]);
+        ranks.zip(normals).for_each(|(rank, ((&x, &y), &z))| *rank = dot([x, y, z], FACE_ORDER));
+    }
+
+    /// Pixels of one row from `at` on; 0 is the one before the image.
+    #[inline(always)]
+    fn block(&self, row: usize, at: usize) -> Block<'_> {
+        let from = row * self.stride + at;
+        Block {
+            near: block(&self.near, from),
+            normal: self.normal.each_ref().map(|n| block(n, from)),
+            rank: block(&self.rank, from),
         }
     }
+}
+
+#[inline(always)]
+fn block(values: &[f32], from: usize) -> &[f32; BLOCK] {
+    values[from..].first_chunk().expect("rows are whole blocks")
+}
+
+/// Draws strip by strip; `fill` writes the rows from the given one on into a strip that is clear.
+#[inline(always)]
+fn draw_strips(size: usize, config: &LineConfig, ink: &mut [u8], mut fill: impl FnMut(usize, &mut Strip)) {
+    let cos_crease = config.crease_degrees.to_radians().cos();
+    let crease = |first: &Block, second: &Block| creases(first, second, cos_crease, config.depth_step);
+    let mut strip = Strip::new(size);
+    // What a row's pixels leave on themselves, on the ones to the right, and on the ones below.
+    let [mut own, mut right, mut below, mut above] = [(); 4].map(|()| vec![0u8; strip.stride]);
+    // Once more than there are strips, for the last row.
+    for top in (0..=size).step_by(TILE) {
+        strip.advance();
+        if top < size {
+            fill(top, &mut strip);
+        }
+        for row in top.max(1) - 1..size.min(top + TILE - 1) {
+            let at = row + OVERLAP - top;
+            for col in (0..size).step_by(BLOCK) {
+                let here = strip.block(at, col + 1);
+                let (mut marks, mut beside, mut beneath) = ([0; BLOCK], [0; BLOCK], [0; BLOCK]);
+                if here.near.iter().fold(0, |any, near| any | near.to_bits()) != 0 {
+                    let (next, under) = (strip.block(at, col + 2), strip.block(at + 1, col + 1));
+                    let around = [block(&strip.near, at * strip.stride + col), next.near];
+                    let across = [block(&strip.near, (at - 1) * strip.stride + col + 1), under.near];
+                    marks = outlines(here.near, [around, across], config.depth_step);
+                    let creases = [crease(&here, &next), crease(&here, &under)];
+                    (0..BLOCK).for_each(|i| marks[i] |= creases[0].0[i] | creases[1].0[i]);
+                    (beside, beneath) = (creases[0].1, creases[1].1);
+                }
+                own[col..col + BLOCK].copy_from_slice(&marks);
+                right[col + 1..col + 1 + BLOCK].copy_from_slice(&beside);
+                below[col..col + BLOCK].copy_from_slice(&beneath);
+            }
+            for (i, ink) in ink[row * size..(row + 1) * size].iter_mut().enumerate() {
+                *ink = own[i] | right[i] | above[i];
+            }
+            std::mem::swap(&mut above, &mut below);
+        }
+    }
+}
+
+/// Ink on outlines and on steps of depth, from the pixels before and behind along either axis.
+#[inline(always)]
+fn outlines(here: &[f32; BLOCK], pairs: [[&[f32; BLOCK]; 2]; 2], depth_step: f32) -> [u8; BLOCK] {
+    let mut ink = [0; BLOCK];
+    for i in 0..BLOCK {
+        let [[left, right], [above, below]] = pairs.map(|pair| pair.map(|near| near[i]));
+        let outline = (left == 0.0) | (right == 0.0) | (above == 0.0) | (below == 0.0);
+        let step = (2.0 * here[i] - left - right > depth_step) | (2.0 * here[i] - above - below > depth_step);
+        ink[i] = if (here[i] != 0.0) & (outline | step) { 255 } else { 0 };
+    }
     ink
+}
+
+/// The ink that creases between neighbours leave on the first ones and on the second ones.
+///
+/// A crease belongs to what is in front; where both are equally far, to the same face all along.
+#[inline(always)]
+fn creases(first: &Block, second: &Block, cos_crease: f32, depth_step: f32) -> ([u8; BLOCK], [u8; BLOCK]) {
+    let (mut one, mut other) = ([0; BLOCK], [0; BLOCK]);
+    for i in 0..BLOCK {
+        let cosine = dot(first.normal.map(|n| n[i]), second.normal.map(|n| n[i]));
+        let crease = (first.near[i] != 0.0) & (second.near[i] != 0.0) & (cosine < cos_crease);
+        let ahead = first.near[i] - second.near[i];
+        let level = (ahead <= depth_step) & (-ahead <= depth_step);
+        let owns = (level & (first.rank[i] >= second.rank[i])) | (!level & (ahead > 0.0));
+        one[i] = if crease & owns { 255 } else { 0 };
+        other[i] = if crease & !owns { 255 } else { 0 };
+    }
+    (one, other)
 }
 
 /// Of two faces that meet in a crease, the one whose normal has more of this carries the line: tops before sides.
 const FACE_ORDER: [f32; 3] = [0.32, 1.0, 0.11];
 
+#[inline(always)]
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
@@ -99,16 +246,30 @@ mod tests {
             depth: cells()
                 .map(|c| if c == b'.' { f32::INFINITY } else { 2.0 + 0.1 * digit(c) as f32 })
                 .collect(),
-            normal: cells().map(|c| if c == b'.' { [0.0; 3] } else { normals[digit(c) % 3] }).collect(),
+            normal: [0, 1, 2].map(|axis| {
+                cells().map(|c| if c == b'.' { 0.0 } else { normals[digit(c) % 3][axis] }).collect()
+            }),
             size: rows.len(),
         }
     }
 
+    fn ink(buffers: &Buffers, config: &LineConfig) -> Vec<u8> {
+        let mut ink = vec![0; buffers.size * buffers.size];
+        detect(buffers, config, &mut ink);
+        ink
+    }
+
     fn drawn(buffers: &Buffers, config: &LineConfig) -> Vec<String> {
-        detect(buffers, config)
+        ink(buffers, config)
             .chunks(buffers.size)
-            .map(|row| row.iter().map(|&b| if b { '#' } else { '.' }).collect())
+            .map(|row| row.iter().map(|&v| if v > 0 { '#' } else { '.' }).collect())
             .collect()
+    }
+
+    fn turn_up(buffers: &mut Buffers, pixel: usize) {
+        for (axis, value) in [0.0, 1.0, 0.0].into_iter().enumerate() {
+            buffers.normal[axis][pixel] = value;
+        }
     }
 
     #[test]
@@ -135,7 +296,7 @@ mod tests {
         let mut buffers = picture(&["0000000"; 7]);
         for row in 0..7 {
             for col in 4..7 {
-                buffers.normal[row * 7 + col] = [0.0, 1.0, 0.0];
+                turn_up(&mut buffers, row * 7 + col);
             }
         }
         // The face whose normal points up carries it.
@@ -150,14 +311,14 @@ mod tests {
             for row in 0..9 {
                 for col in 0..9 {
                     if (if rising { 8 - row } else { row }) < col {
-                        buffers.normal[row * 9 + col] = [0.0, 1.0, 0.0];
+                        turn_up(&mut buffers, row * 9 + col);
                     }
                 }
             }
-            let ink = detect(&buffers, &LineConfig::default());
+            let ink = ink(&buffers, &LineConfig::default());
             let inner = (1..8).flat_map(|row| (1..8).map(move |col| row * 9 + col));
             // Not counting the outline: along a diagonal of seven inner rows, one pixel a row.
-            assert_eq!(inner.filter(|&i| ink[i]).count(), 6, "rising: {rising}");
+            assert_eq!(inner.filter(|&i| ink[i] > 0).count(), 6, "rising: {rising}");
         }
     }
 }

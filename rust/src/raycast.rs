@@ -1,244 +1,388 @@
-//! Where a ray is inside a CSG shape: the exact intervals, with the faces they begin and end on.
+//! Where rays are inside a shape: each primitive is one interval of a ray, and the last one that holds a point decides.
+//! No tree, no sampling.
 //!
-//! Primitives are applied in order to a short list of intervals: an additive one is united with it, a
-//! subtractive one cut out of it. What remains is the shape along the ray; no tree, no sampling.
-//! Rays are parametrised by depth along the camera's z axis, so an interval's ends are depths.
+//! Points of a ray are named by their *nearness*, 1 / depth along the camera's z axis: it is affine over the image on
+//! every plane, so a ray meets a plane by one product, a cylinder by one square root, and nothing is divided. Rays go
+//! in tiles of 8 x 8, which share a list of primitives; every step is a loop over the 64 rays, which the compiler
+//! vectorises.
 
 use crate::camera::{Camera, IMAGE};
 use crate::csg::{Kind, Primitive, Shape, cross_axes};
+use crate::error::CoreError;
 use glam::DVec3;
 
 /// Gaps and slivers shorter than this (world units) are rounding, not geometry.
 const EPSILON: f64 = 1e-9;
+/// The nearness of points at the eye or behind it.
+const NEAREST: f64 = 1e8;
+/// Instead of a distance of 0, so that the eye may lie in the plane of a face.
+const NO_DISTANCE: f64 = 1e-290;
 
-/// The face of a primitive: its index, and 0, 1, 2 for a flat face across x, y, z, 3 for the curved or
-/// slanted one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Face {
-    primitive: u32,
-    side: u8,
-}
+/// Rays along each side of a tile.
+pub const TILE: usize = 8;
+/// Rays of a tile, row by row.
+pub const RAYS: usize = TILE * TILE;
+/// One number for each ray of a tile.
+pub type Lanes = [f64; RAYS];
 
-/// One stretch of a ray inside the shape, from depth `start` to depth `end`.
-#[derive(Clone, Copy, Debug)]
-pub struct Span {
-    pub start: f64,
-    pub end: f64,
-    pub entry: Face,
-    exit: Face,
-}
-
-/// A shape prepared for the rays of one camera: who may be seen where in the image.
+/// A shape prepared for the rays of one camera.
 pub struct RayCaster<'a> {
-    primitives: &'a [Primitive],
     camera: &'a Camera,
-    /// Image bounds of each primitive: x from, x to, y from, y to, in [-1, 1] units of the image.
-    bounds: Vec<[f64; 4]>,
+    primitives: Vec<Placed>,
+}
+
+/// A primitive as the eye has it.
+struct Placed {
+    primitive: Primitive,
+    /// From the primitive's centre to the eye.
+    origin: DVec3,
+    /// For the lower and the upper face across each axis, 1 / its distance from the eye along the axis.
+    faces: [[f64; 2]; 3],
+    /// Image bounds: x from, x to, y from, y to, in [-1, 1] units of the image.
+    bounds: [f64; 4],
 }
 
 impl<'a> RayCaster<'a> {
-    pub fn new(shape: &'a Shape, camera: &'a Camera) -> Self {
-        let primitives = shape.primitives();
-        let bounds = primitives.iter().map(|p| image_bounds(p, camera)).collect();
-        Self { primitives, camera, bounds }
-    }
-
-    /// Indices of the primitives that rays through this part of the image may meet, into `out`.
-    pub fn visible(&self, x: (f64, f64), y: (f64, f64), out: &mut Vec<u32>) {
-        out.clear();
-        out.extend((0..self.primitives.len() as u32).filter(|&i| {
-            let b = &self.bounds[i as usize];
-            b[0] <= x.1 && x.0 <= b[1] && b[2] <= y.1 && y.0 <= b[3]
-        }));
-    }
-
-    /// The stretches of the ray along `direction` (from the eye, one unit of depth) inside the shape, in order
-    /// of depth, into `spans`. `candidates` comes from `visible`.
-    pub fn spans(&self, direction: DVec3, candidates: &[u32], spans: &mut Vec<Span>) {
-        spans.clear();
-        let inverse = direction.recip();
-        for &index in candidates {
-            let primitive = &self.primitives[index as usize];
-            if !primitive.additive && spans.is_empty() {
-                continue;
-            }
-            let origin = self.camera.position - primitive.center;
-            let Some((a, b, entry, exit)) = intersect(primitive, origin, direction, inverse) else {
-                continue;
-            };
-            let face = |side| Face { primitive: index, side };
-            let span = Span { start: a, end: b, entry: face(entry), exit: face(exit) };
-            if primitive.additive {
-                unite(spans, span);
-            } else {
-                cut(spans, &span);
-            }
+    /// Refuses an eye inside the shape.
+    pub fn new(shape: &Shape, camera: &'a Camera) -> Result<Self, CoreError> {
+        if shape.contains(camera.position) {
+            return Err(CoreError::EyeInside(camera.position.to_array()));
         }
-        spans.retain(|s| s.start > 0.0);
+        let placed = |p: &Primitive| {
+            let origin = camera.position - p.center;
+            // An eye in the plane of a face counts as between the two.
+            let distances =
+                |a: usize| [-p.half[a] - origin[a] - NO_DISTANCE, p.half[a] - origin[a] + NO_DISTANCE];
+            let faces = [0, 1, 2].map(|a| distances(a).map(f64::recip));
+            Placed { primitive: *p, origin, faces, bounds: image_bounds(p, camera) }
+        };
+        Ok(Self { camera, primitives: shape.primitives().iter().map(placed).collect() })
     }
 
-    /// The unit normal of a face where the ray meets it, turned towards the eye.
-    pub fn normal(&self, face: Face, direction: DVec3, depth: f64) -> DVec3 {
-        let p = &self.primitives[face.primitive as usize];
-        let normal = match face.side {
-            0 => DVec3::X,
-            1 => DVec3::Y,
-            2 => DVec3::Z,
-            _ => round_or_slanted(p, self.camera.position + direction * depth - p.center),
-        };
-        if normal.dot(direction) > 0.0 { -normal } else { normal }
+    pub fn camera(&self) -> &Camera {
+        self.camera
     }
 }
 
-/// A normal of the face that is not flat across an axis, at a point of it relative to the primitive's centre.
-fn round_or_slanted(primitive: &Primitive, at: DVec3) -> DVec3 {
-    let half = primitive.half;
-    let mut normal = DVec3::ZERO;
-    match primitive.kind {
+/// The rays of one tile, and where they are inside each of the primitives that they meet.
+pub struct Tile {
+    /// One unit of depth along each ray, in the world.
+    direction: [Lanes; 3],
+    crossings: Vec<Crossing>,
+    /// How many of the crossings are of this tile.
+    met: usize,
+}
+
+/// Where each ray is inside a primitive: from one nearness to a lesser one. The first is 0 for a ray that misses it.
+#[derive(Clone)]
+struct Crossing {
+    primitive: usize,
+    additive: bool,
+    start: Lanes,
+    end: Lanes,
+}
+
+/// The surface that each ray comes to next: how near it is, 0 for none, and whose it is by the number of the crossing.
+pub struct Hits {
+    pub nearness: Lanes,
+    crossing: [u64; RAYS],
+}
+
+impl Tile {
+    pub fn new(caster: &RayCaster) -> Self {
+        let none = Crossing { primitive: 0, additive: true, start: [0.0; RAYS], end: [0.0; RAYS] };
+        let crossings = vec![none; caster.primitives.len()];
+        Self { direction: [[0.0; RAYS]; 3], crossings, met: 0 }
+    }
+
+    /// Casts rays through the image at all of `xs` and `ys` (ascending, [-1, 1] units). Whether any meets anything.
+    #[inline(always)]
+    pub fn cast(&mut self, caster: &RayCaster, xs: &[f64; TILE], ys: &[f64; TILE]) -> bool {
+        self.met = 0;
+        let mut aimed = false;
+        for (index, placed) in caster.primitives.iter().enumerate() {
+            let [left, right, top, bottom] = placed.bounds;
+            let apart = (left > xs[TILE - 1]) | (right < xs[0]) | (top > ys[TILE - 1]) | (bottom < ys[0]);
+            let additive = placed.primitive.additive;
+            if apart || (self.met == 0 && !additive) {
+                continue;
+            }
+            if !aimed {
+                self.aim(caster.camera, xs, ys);
+                aimed = true;
+            }
+            let crossing = &mut self.crossings[self.met];
+            (crossing.primitive, crossing.additive) = (index, additive);
+            self.met += usize::from(cross(placed, &self.direction, &mut crossing.start, &mut crossing.end));
+        }
+        self.met > 0
+    }
+
+    #[inline(always)]
+    fn aim(&mut self, camera: &Camera, xs: &[f64; TILE], ys: &[f64; TILE]) {
+        let h = camera.half_image;
+        for (axis, direction) in self.direction.iter_mut().enumerate() {
+            let [right, down, forward] = camera.axes.map(|a| a[axis]);
+            for (row, y) in direction.as_chunks_mut::<TILE>().0.iter_mut().zip(ys) {
+                for (d, x) in row.iter_mut().zip(xs) {
+                    *d = right * (x * h) + down * (y * h) + forward;
+                }
+            }
+        }
+    }
+
+    /// Where each ray enters the shape, in front of the eye; not before `from`, a point outside.
+    ///
+    /// That is where it enters an additive primitive, moved on to the end of every later subtractive one that holds
+    /// the point.
+    #[inline(always)]
+    pub fn entries(&self, from: Option<&Lanes>) -> Hits {
+        let crossings = &self.crossings[..self.met];
+        let mut hits = Hits { nearness: [0.0; RAYS], crossing: [0; RAYS] };
+        for number in (0..crossings.len()).filter(|&i| crossings[i].additive) {
+            hits.offer(crossings, number, from);
+        }
+        hits
+    }
+
+    /// Where each ray leaves the shape after `from`, a point inside.
+    #[inline(always)]
+    pub fn exits(&self, from: &Lanes) -> Hits {
+        let crossings = &self.crossings[..self.met];
+        // It enters nothing, of which all additive primitives are taken away; or a subtractive one.
+        let mut hits = Hits { nearness: *from, crossing: [0; RAYS] };
+        hits.push(crossings, 0, true);
+        for number in (0..crossings.len()).filter(|&i| !crossings[i].additive) {
+            hits.offer(crossings, number, Some(from));
+        }
+        hits
+    }
+
+    /// The unit normals in the world where rays meet the shape, turned towards the eye; 0 where they do not.
+    #[inline(always)]
+    pub fn normals(&self, caster: &RayCaster, hits: &Hits) -> [Lanes; 3] {
+        let mut normals = [[0.0; RAYS]; 3];
+        for (number, crossing) in self.crossings[..self.met].iter().enumerate() {
+            // How near the hits on this primitive are; 0 at other rays.
+            let mut own = [0.0; RAYS];
+            let mut any = 0;
+            for r in 0..RAYS {
+                own[r] = if hits.crossing[r] == number as u64 { hits.nearness[r] } else { 0.0 };
+                any |= own[r].to_bits();
+            }
+            if any != 0 {
+                self.face_normals(&caster.primitives[crossing.primitive], own, &mut normals);
+            }
+        }
+        normals
+    }
+
+    /// Those on one primitive. The face is the first one that the ray meets just there: flat ones in the order of
+    /// their axes, then the curved or slanted one.
+    #[inline(always)]
+    fn face_normals(&self, placed: &Placed, mut nearness: Lanes, normals: &mut [Lanes; 3]) {
+        for axis in flat_axes(&placed.primitive.kind) {
+            let [low, high] = placed.faces[axis];
+            let (direction, normal) = (&self.direction[axis], &mut normals[axis]);
+            for r in 0..RAYS {
+                let (d, at) = (direction[r], nearness[r]);
+                let here = (at > 0.0) & ((low * d == at) | (high * d == at));
+                normal[r] = if here { -1f64.copysign(d) } else { normal[r] };
+                nearness[r] = if here { 0.0 } else { at };
+            }
+        }
+        let (Kind::Cylinder { axis } | Kind::Wedge { axis, .. }) = placed.primitive.kind else { return };
+        let (u, v) = cross_axes(axis);
+        let (du, dv) = (&self.direction[u], &self.direction[v]);
+        let (ou, ov, half) = (placed.origin[u], placed.origin[v], placed.primitive.half);
+        let (iu, iv) = (1.0 / (half[u] * half[u]), 1.0 / (half[v] * half[v]));
+        for r in 0..RAYS {
+            let (nu, nv) = match placed.primitive.kind {
+                Kind::Wedge { corner, .. } => {
+                    (f64::from(corner[0]) / half[u], f64::from(corner[1]) / half[v])
+                }
+                // The gradient, times the nearness.
+                _ => ((ou * nearness[r] + du[r]) * iu, (ov * nearness[r] + dv[r]) * iv),
+            };
+            let unit = 1.0 / (nu * nu + nv * nv).sqrt();
+            let unit = if nu * du[r] + nv * dv[r] > 0.0 { -unit } else { unit };
+            let here = nearness[r] > 0.0;
+            normals[u][r] = if here { nu * unit } else { normals[u][r] };
+            normals[v][r] = if here { nv * unit } else { normals[v][r] };
+        }
+    }
+}
+
+impl Hits {
+    /// How deep the surfaces are; infinite for none.
+    #[inline(always)]
+    pub fn depth(&self) -> Lanes {
+        let mut depth = [0.0; RAYS];
+        for r in 0..RAYS {
+            depth[r] = 1.0 / self.nearness[r];
+        }
+        depth
+    }
+
+    /// Takes the first point in one primitive, not before `from`, but in no later one of the other sign, where that
+    /// point is nearer.
+    #[inline(always)]
+    fn offer(&mut self, crossings: &[Crossing], number: usize, from: Option<&Lanes>) {
+        let Crossing { start, end, additive, .. } = &crossings[number];
+        let cut = crossings[number..].iter().any(|c| c.additive != *additive);
+        if !cut && from.is_none() {
+            for r in 0..RAYS {
+                let nearer = (start[r] > self.nearness[r]) & (start[r] < NEAREST);
+                self.nearness[r] = if nearer { start[r] } else { self.nearness[r] };
+                self.crossing[r] = if nearer { number as u64 } else { self.crossing[r] };
+            }
+            return;
+        }
+        let from = from.unwrap_or(&[NEAREST; RAYS]);
+        let mut first = Hits { nearness: *start, crossing: [number as u64; RAYS] };
+        for r in 0..RAYS {
+            first.nearness[r] = less(start[r], from[r]);
+        }
+        if cut {
+            first.push(crossings, number + 1, !additive);
+        }
+        for r in 0..RAYS {
+            let at = first.nearness[r];
+            let begins = (at == start[r]) & (at < from[r]);
+            let there = begins | (at - end[r] > EPSILON * at * at);
+            let nearer = there & (at > self.nearness[r]) & (at < NEAREST);
+            self.nearness[r] = if nearer { at } else { self.nearness[r] };
+            self.crossing[r] = if nearer { first.crossing[r] } else { self.crossing[r] };
+        }
+    }
+
+    /// Moves points on until they lie in none of the crossings of one sign from number `first` on.
+    #[inline(always)]
+    fn push(&mut self, crossings: &[Crossing], first: usize, additive: bool) {
+        let mut moved = true;
+        while moved {
+            moved = false;
+            for (number, c) in
+                crossings.iter().enumerate().skip(first).filter(|(_, c)| c.additive == additive)
+            {
+                let mut any = 0;
+                for r in 0..RAYS {
+                    let at = self.nearness[r];
+                    let slack = EPSILON * at * at;
+                    let within = (c.start[r] >= at - slack) & (at - slack > c.end[r]);
+                    self.nearness[r] = if within { c.end[r] } else { at };
+                    self.crossing[r] = if within { number as u64 } else { self.crossing[r] };
+                    any |= u64::from(within);
+                }
+                moved |= any != 0;
+            }
+        }
+    }
+}
+
+/// Where rays enter and leave one primitive. Whether any does.
+#[inline(always)]
+fn cross(placed: &Placed, direction: &[Lanes; 3], start: &mut Lanes, end: &mut Lanes) -> bool {
+    (*start, *end) = ([NEAREST; RAYS], [0.0; RAYS]);
+    for axis in flat_axes(&placed.primitive.kind) {
+        cross_slab(placed.faces[axis], &direction[axis], start, end);
+    }
+    let half = placed.primitive.half;
+    match placed.primitive.kind {
         Kind::Cuboid => {}
         Kind::Cylinder { axis } => {
             let (u, v) = cross_axes(axis);
-            (normal[u], normal[v]) = (at[u] / (half[u] * half[u]), at[v] / (half[v] * half[v]));
+            let (iu, iv) = (1.0 / half[u], 1.0 / half[v]);
+            let origin = [placed.origin[u] * iu, placed.origin[v] * iv];
+            let mut across = [direction[u], direction[v]];
+            for r in 0..RAYS {
+                (across[0][r], across[1][r]) = (across[0][r] * iu, across[1][r] * iv);
+            }
+            cross_circle(origin, &across, start, end);
         }
         Kind::Wedge { axis, corner } => {
             let (u, v) = cross_axes(axis);
-            (normal[u], normal[v]) = (f64::from(corner[0]) / half[u], f64::from(corner[1]) / half[v]);
+            let (nu, nv) = (f64::from(corner[0]) / half[u], f64::from(corner[1]) / half[v]);
+            // How far inside the slanted face the eye is; and the ray, for each unit of depth.
+            let within = nu * placed.origin[u] + nv * placed.origin[v];
+            let inverse = -1.0 / if within == 0.0 { NO_DISTANCE } else { within };
+            let (du, dv) = (&direction[u], &direction[v]);
+            for r in 0..RAYS {
+                let at = (nu * du[r] + nv * dv[r]) * inverse;
+                if within < 0.0 {
+                    start[r] = less(at, start[r]);
+                } else {
+                    end[r] = greater(at, end[r]);
+                }
+            }
         }
     }
-    normal.normalize()
+    let mut any = 0;
+    for r in 0..RAYS {
+        start[r] = if start[r] > end[r] { start[r] } else { 0.0 };
+        any |= start[r].to_bits();
+    }
+    any != 0
 }
 
-/// Entry and exit depth of a ray through one primitive, with the sides it enters and leaves by.
-// In line, and wedges apart: drawing cuboids and cylinders takes a tenth longer otherwise.
+/// The axes across which a primitive has two flat faces.
 #[inline(always)]
-fn intersect(
-    primitive: &Primitive,
-    origin: DVec3,
-    direction: DVec3,
-    inverse: DVec3,
-) -> Option<(f64, f64, u8, u8)> {
-    let (mut a, mut b, mut entry, mut exit) = (f64::NEG_INFINITY, f64::INFINITY, 0, 0);
-    let mut slab = |axis: usize| {
-        let half = primitive.half[axis];
-        if direction[axis] == 0.0 {
-            return origin[axis].abs() <= half;
-        }
-        let (s, t) = ((-half - origin[axis]) * inverse[axis], (half - origin[axis]) * inverse[axis]);
-        let (s, t) = if s <= t { (s, t) } else { (t, s) };
-        if s > a {
-            (a, entry) = (s, axis as u8);
-        }
-        if t < b {
-            (b, exit) = (t, axis as u8);
-        }
-        a < b
-    };
-    match primitive.kind {
-        Kind::Cuboid => {
-            if !(slab(0) && slab(1) && slab(2)) {
-                return None;
-            }
-        }
-        Kind::Wedge { .. } => return intersect_wedge(primitive, origin, direction, inverse),
-        Kind::Cylinder { axis } => {
-            if !slab(axis) {
-                return None;
-            }
-            let (u, v) = cross_axes(axis);
-            let (iu, iv) = (1.0 / primitive.half[u], 1.0 / primitive.half[v]);
-            let (ou, ov, du, dv) = (origin[u] * iu, origin[v] * iv, direction[u] * iu, direction[v] * iv);
-            let (qa, qb, qc) = (du * du + dv * dv, ou * du + ov * dv, ou * ou + ov * ov - 1.0);
-            if qa == 0.0 {
-                if qc > 0.0 {
-                    return None;
-                }
-            } else {
-                let discriminant = qb * qb - qa * qc;
-                if discriminant <= 0.0 {
-                    return None;
-                }
-                let root = discriminant.sqrt();
-                let (s, t) = ((-qb - root) / qa, (-qb + root) / qa);
-                if s > a {
-                    (a, entry) = (s, 3);
-                }
-                if t < b {
-                    (b, exit) = (t, 3);
-                }
-                if a >= b {
-                    return None;
-                }
-            }
-        }
+fn flat_axes(kind: &Kind) -> std::ops::Range<usize> {
+    match *kind {
+        Kind::Cylinder { axis } => axis..axis + 1,
+        _ => 0..3,
     }
-    (b > 0.0).then_some((a, b, entry, exit))
 }
 
-/// What `intersect` finds of a wedge: its box, clipped by its slanted face.
-#[inline(never)]
-fn intersect_wedge(
-    primitive: &Primitive,
-    origin: DVec3,
-    direction: DVec3,
-    inverse: DVec3,
-) -> Option<(f64, f64, u8, u8)> {
-    let Kind::Wedge { axis, corner } = primitive.kind else { return None };
-    let cuboid = Primitive { kind: Kind::Cuboid, ..*primitive };
-    let (mut a, mut b, mut entry, mut exit) = intersect(&cuboid, origin, direction, inverse)?;
-    let (u, v) = cross_axes(axis);
-    let (nu, nv) = (f64::from(corner[0]) / primitive.half[u], f64::from(corner[1]) / primitive.half[v]);
-    // How far inside the slanted face, at the eye and for each unit of depth.
-    let (within, slope) = (nu * origin[u] + nv * origin[v], nu * direction[u] + nv * direction[v]);
-    let t = -within / slope;
-    if slope > 0.0 && t > a {
-        (a, entry) = (t, 3);
-    }
-    if slope < 0.0 && t < b {
-        (b, exit) = (t, 3);
-    }
-    let missed = a >= b || b <= 0.0 || (slope == 0.0 && within < 0.0);
-    (!missed).then_some((a, b, entry, exit))
-}
-
-/// Adds a stretch, joining it with those it touches.
-fn unite(spans: &mut Vec<Span>, mut new: Span) {
-    let first = spans.partition_point(|s| s.end < new.start - EPSILON);
-    let mut last = first;
-    while last < spans.len() && spans[last].start <= new.end + EPSILON {
-        let old = spans[last];
-        if old.start < new.start - EPSILON {
-            (new.start, new.entry) = (old.start, old.entry);
+/// Clips rays by two parallel faces. An eye between them sees only one of the two, from within.
+#[inline(always)]
+fn cross_slab([low, high]: [f64; 2], direction: &Lanes, start: &mut Lanes, end: &mut Lanes) {
+    if low < 0.0 && high > 0.0 {
+        for r in 0..RAYS {
+            end[r] = greater(greater(low * direction[r], high * direction[r]), end[r]);
         }
-        if old.end > new.end + EPSILON {
-            (new.end, new.exit) = (old.end, old.exit);
-        }
-        last += 1;
-    }
-    if first == last {
-        spans.insert(first, new);
     } else {
-        spans[first] = new;
-        spans.drain(first + 1..last);
+        for r in 0..RAYS {
+            let (s, t) = (low * direction[r], high * direction[r]);
+            start[r] = less(greater(s, t), start[r]);
+            end[r] = greater(less(s, t), end[r]);
+        }
     }
 }
 
-/// Takes a stretch away.
-fn cut(spans: &mut Vec<Span>, hole: &Span) {
-    let mut i = 0;
-    while i < spans.len() {
-        let old = spans[i];
-        if old.end <= hole.start + EPSILON || old.start >= hole.end - EPSILON {
-            i += 1;
-            continue;
+/// Clips rays by the unit circle; `origin` and `direction` are two-dimensional.
+///
+/// Depth t has |origin + t direction| = 1, so nearness w has qc w^2 + 2 qb w + qa = 0, where only qc, which is less than
+/// 0 for an eye within the circle, is the same for all rays.
+#[inline(always)]
+fn cross_circle(origin: [f64; 2], direction: &[Lanes; 2], start: &mut Lanes, end: &mut Lanes) {
+    let qc = origin[0] * origin[0] + origin[1] * origin[1] - 1.0;
+    let inverse = 1.0 / if qc == 0.0 { NO_DISTANCE } else { qc };
+    for r in 0..RAYS {
+        let (du, dv) = (direction[0][r], direction[1][r]);
+        let (qa, qb) = (du * du + dv * dv, origin[0] * du + origin[1] * dv);
+        let discriminant = qb * qb - qa * qc;
+        let root = discriminant.sqrt();
+        if qc > 0.0 {
+            let entry = if discriminant > 0.0 { (root - qb) * inverse } else { 0.0 };
+            start[r] = less(entry, start[r]);
+            end[r] = greater((-root - qb) * inverse, end[r]);
+        } else {
+            end[r] = greater((-root - qb) * inverse, end[r]);
         }
-        let before =
-            (hole.start - old.start > EPSILON).then_some(Span { end: hole.start, exit: hole.entry, ..old });
-        let after =
-            (old.end - hole.end > EPSILON).then_some(Span { start: hole.end, entry: hole.exit, ..old });
-        let left = usize::from(before.is_some()) + usize::from(after.is_some());
-        spans.splice(i..=i, before.into_iter().chain(after));
-        i += left;
     }
+}
+
+/// The lesser one; `b` if either is no number.
+#[inline(always)]
+fn less(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The greater one; `b` if either is no number.
+#[inline(always)]
+fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// A rectangle of the image, in [-1, 1] units, that holds the primitive; all of it when part lies behind the eye.
@@ -282,25 +426,50 @@ mod tests {
         prop::collection::vec(primitive, 1..9).prop_map(|p| Shape::new(p).unwrap())
     }
 
+    /// The stretches of one ray inside the shape; the other rays of its tile go elsewhere.
+    fn spans(shape: &Shape, camera: &Camera, x: f64, y: f64) -> Vec<(f64, f64)> {
+        let (_, tile) = cast(shape, camera, x, y);
+        let (mut from, mut spans) = (None, Vec::new());
+        loop {
+            let entries = tile.entries(from.as_ref());
+            let exits = tile.exits(&entries.nearness);
+            if entries.nearness[0] == 0.0 {
+                return spans;
+            }
+            spans.push((entries.depth()[0], exits.depth()[0]));
+            from = Some(exits.nearness);
+        }
+    }
+
+    fn normal(shape: &Shape, camera: &Camera, x: f64, y: f64) -> DVec3 {
+        let (caster, tile) = cast(shape, camera, x, y);
+        DVec3::from(tile.normals(&caster, &tile.entries(None)).map(|n| n[0]))
+    }
+
+    fn cast<'a>(shape: &Shape, camera: &'a Camera, x: f64, y: f64) -> (RayCaster<'a>, Tile) {
+        let caster = RayCaster::new(shape, camera).unwrap();
+        let mut tile = Tile::new(&caster);
+        let from = |at: f64| std::array::from_fn(|i| at + 0.03 * i as f64);
+        tile.cast(&caster, &from(x), &from(y));
+        (caster, tile)
+    }
+
     proptest! {
         #[test]
         fn spans_agree_with_points_along_the_ray(
             shape in any_shape(), x in -0.9..0.9, y in -0.9..0.9, azimuth in 0.0..360.0, elevation in -80.0..80.0
         ) {
             let camera = Camera::orbit(azimuth, elevation, 0.0, 2.0);
-            let caster = RayCaster::new(&shape, &camera);
             let direction = camera.ray(x, y);
-            let (mut candidates, mut spans) = (Vec::new(), Vec::new());
-            caster.visible((x, x), (y, y), &mut candidates);
-            caster.spans(direction, &candidates, &mut spans);
+            let spans = spans(&shape, &camera, x, y);
             for pair in spans.windows(2) {
-                prop_assert!(pair[0].end < pair[1].start);
+                prop_assert!(pair[0].1 < pair[1].0);
             }
             for k in 0..400 {
                 let depth = 1.25 + 1.5 * (f64::from(k) + 0.37) / 400.0;
-                let near_an_end = spans.iter().any(|s| (s.start - depth).abs().min((s.end - depth).abs()) < 1e-7);
+                let near_an_end = spans.iter().any(|s| (s.0 - depth).abs().min((s.1 - depth).abs()) < 1e-7);
                 if !near_an_end {
-                    let within = spans.iter().any(|s| s.start < depth && depth < s.end);
+                    let within = spans.iter().any(|s| s.0 < depth && depth < s.1);
                     prop_assert_eq!(within, shape.contains(camera.position + direction * depth));
                 }
             }
@@ -322,12 +491,10 @@ mod tests {
         ])
         .unwrap();
         let camera = Camera::orbit(0.0, 0.0, 0.0, 2.0);
-        let caster = RayCaster::new(&shape, &camera);
-        let mut spans = Vec::new();
-        caster.spans(camera.ray(0.0, 0.0), &[0, 1, 2], &mut spans);
+        let spans = spans(&shape, &camera, 0.0, 0.0);
         assert_eq!(spans.len(), 1);
-        assert!((spans[0].start - 1.9).abs() < 1e-12 && (spans[0].end - 2.2).abs() < 1e-12);
-        let normal = caster.normal(spans[0].entry, camera.ray(0.0, 0.0), spans[0].start);
+        assert!((spans[0].0 - 1.9).abs() < 1e-12 && (spans[0].1 - 2.2).abs() < 1e-12);
+        let normal = normal(&shape, &camera, 0.0, 0.0);
         assert!((normal - DVec3::X).length() < 1e-12, "{normal}");
     }
 
@@ -340,15 +507,12 @@ mod tests {
         let half = DVec3::new(0.2, 0.1, 0.3);
         let primitive = Primitive { kind, additive: true, center: DVec3::ZERO, half };
         let shape = Shape::new(vec![primitive]).unwrap();
-        let caster = RayCaster::new(&shape, &camera);
-        let mut spans = Vec::new();
         for image_y in [-0.1, 0.0, 0.1] {
-            let direction = camera.ray(0.0, image_y);
-            caster.spans(direction, &[0], &mut spans);
-            let expected = 2.0 / (1.0 - 2.0 * direction.y);
+            let spans = spans(&shape, &camera, 0.0, image_y);
+            let expected = 2.0 / (1.0 - 2.0 * camera.ray(0.0, image_y).y);
             assert_eq!(spans.len(), 1);
-            assert!((spans[0].start - expected).abs() < 1e-12, "{} {expected}", spans[0].start);
-            let normal = caster.normal(spans[0].entry, direction, spans[0].start);
+            assert!((spans[0].0 - expected).abs() < 1e-12, "{} {expected}", spans[0].0);
+            let normal = normal(&shape, &camera, 0.0, image_y);
             let across = DVec3::new(1.0, 2.0, 0.0).normalize();
             assert!((normal - across).length() < 1e-12, "{normal}");
         }

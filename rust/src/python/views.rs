@@ -68,7 +68,9 @@ pub fn isosurface<'py>(
 fn buffer_arrays<'py>(py: Python<'py>, made: Buffers) -> PyResult<BufferArrays<'py>> {
     let size = made.size;
     let depth = made.depth.into_pyarray(py).reshape([size, size])?;
-    let normal = made.normal.into_flattened().into_pyarray(py).reshape([size, size, 3])?;
+    let [x, y, z] = &made.normal;
+    let normal: Vec<[f32; 3]> = x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z]).collect();
+    let normal = normal.into_flattened().into_pyarray(py).reshape([size, size, 3])?;
     Ok((depth, normal))
 }
 
@@ -83,8 +85,9 @@ pub fn lines<'py>(
     let size = check_size(depth.shape().first().map_or(0, |&s| s as i64))?;
     let side = size as isize;
     let depth = checked(&depth, "depth", &[side, side])?.to_vec();
-    let normal = checked(&normal, "normal", &[side, side, 3])?.as_chunks::<3>().0.to_vec();
-    all_finite(normal.as_flattened(), "normal")?;
+    let normal = checked(&normal, "normal", &[side, side, 3])?;
+    all_finite(normal, "normal")?;
+    let normal = [0, 1, 2].map(|axis| normal.iter().skip(axis).step_by(3).copied().collect());
     if depth.iter().any(|d| d.is_nan() || *d <= 0.0) {
         let message = "depth must be more than 0 everywhere, infinite where nothing is seen";
         return Err(PyValueError::new_err(message));
@@ -92,9 +95,9 @@ pub fn lines<'py>(
     let made = Buffers { depth, normal, size };
     let config = LineConfig { depth_step, crease_degrees };
     config.check()?;
-    let ink = py.detach(|| detect(&made, &config));
-    let bytes: Vec<u8> = ink.iter().map(|&i| if i { 255 } else { 0 }).collect();
-    bytes.into_pyarray(py).reshape([size, size])
+    let mut ink = vec![0; size * size];
+    py.detach(|| detect(&made, &config, &mut ink));
+    ink.into_pyarray(py).reshape([size, size])
 }
 
 #[pyfunction]
@@ -105,6 +108,6 @@ pub fn draw<'py>(
 ) -> PyResult<Bound<'py, PyArray2<u8>>> {
     let (shape, camera) = (shape_of(&shape)?, camera_of(&camera)?);
     let mut drawing = vec![0; IMAGE * IMAGE];
-    py.detach(|| crate::batch::draw(&shape, &camera, &LineConfig::default(), &mut drawing))?;
+    py.detach(|| crate::lines::draw(&shape, &camera, &LineConfig::default(), &mut drawing))?;
     drawing.into_pyarray(py).reshape([IMAGE, IMAGE])
 }
