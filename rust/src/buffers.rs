@@ -57,9 +57,9 @@ pub fn cast_row(
     top: usize,
     mut write: impl FnMut(usize, &[f32; RAYS], &[[f32; RAYS]; 3]),
 ) {
-    let ys = image_points(top, size);
+    tile.choose(caster, image_points(top, size));
     for left in (0..size).step_by(TILE) {
-        if tile.cast(caster, &image_points(left, size), &ys) {
+        if tile.cast(caster, &image_points(left, size)) {
             let hits = tile.entries(None);
             let (depth, normals) = (hits.depth(), tile.normals(caster, &hits));
             let mut narrow = [[0.0; RAYS]; 4];
@@ -95,88 +95,121 @@ dispatched! {
     }
 }
 
-/// Squares of cells, as many as one tile of rays holds, or one cell by several tiles.
+/// Goes through squares of cells, as many as one tile of rays holds; or one cell by several tiles.
 #[inline(always)]
 fn fill_tiles(caster: &RayCaster, rays: usize, out: &mut [u8]) {
-    let size = SIDE * rays;
-    let side = (TILE / rays).max(1);
+    let (size, side) = (SIDE * rays, cells_a_side(rays));
     let camera = caster.camera();
     let per_slice = SIDE as f64 / (camera.far - camera.near);
+    let slices = |depth: f64| ((depth - camera.near) * per_slice).clamp(0.0, SIDE as f64);
     let full = 255.0 / (rays * rays) as f64;
+    // The first ray of each tile, and the cell that each of its rays is in.
+    let steps = || (0..side * rays).step_by(TILE);
+    let parts: Vec<_> = steps()
+        .flat_map(|row| steps().map(move |col| (row, col)))
+        .map(|(row, col)| (row, col, cells_of_rays(rays, row, col)))
+        .collect();
     let mut tile = Tile::new(caster);
-    // For each slice and cell, how much more of it is inside than of the slice behind it.
-    let mut gains = [0.0; (SIDE + 1) * RAYS];
+    let mut shares = Shares::new();
     for top in (0..SIDE).step_by(side) {
         for left in (0..SIDE).step_by(side) {
-            let mut any = false;
-            for first_row in (0..side * rays).step_by(TILE) {
-                for first_col in (0..side * rays).step_by(TILE) {
-                    let xs = image_points(left * rays + first_col, size);
-                    let ys = image_points(top * rays + first_row, size);
-                    if !tile.cast(caster, &xs, &ys) {
-                        continue;
+            for (first_row, first_col, cells) in &parts {
+                tile.choose(caster, image_points(top * rays + first_row, size));
+                if !tile.cast(caster, &image_points(left * rays + first_col, size)) {
+                    continue;
+                }
+                let mut entries = tile.entries(None);
+                loop {
+                    let exits = tile.exits(&entries.nearness);
+                    let (start, end) = (entries.depth(), exits.depth());
+                    for r in (0..RAYS).filter(|&r| start[r] < f64::INFINITY) {
+                        shares.add(cells[r], slices(start[r]), slices(end[r]));
                     }
-                    any = true;
-                    let cells: [usize; RAYS] = std::array::from_fn(|r| {
-                        let (row, col) = (first_row + r / TILE, first_col + r % TILE);
-                        let within = row < side * rays && col < side * rays;
-                        if within { row / rays * side + col / rays } else { usize::MAX }
-                    });
-                    let mut from = None;
-                    loop {
-                        let entries = tile.entries(from.as_ref());
-                        if entries.nearness.iter().fold(0, |any, w| any | w.to_bits()) == 0 {
-                            break;
-                        }
-                        let exits = tile.exits(&entries.nearness);
-                        let (start, end) = (entries.depth(), exits.depth());
-                        for r in 0..RAYS {
-                            if start[r] < f64::INFINITY && cells[r] != usize::MAX {
-                                let slices = |depth: f64| (depth - camera.near) * per_slice;
-                                gain(&mut gains, side * side, cells[r], slices(end[r]), 1.0);
-                                gain(&mut gains, side * side, cells[r], slices(start[r]), -1.0);
-                            }
-                        }
-                        from = Some(exits.nearness);
+                    if !tile.goes_on(&exits.nearness) {
+                        break;
                     }
+                    entries = tile.entries(Some(&exits.nearness));
                 }
             }
-            if any {
-                write_cells(&mut gains, side, full, top, left, out);
+            let corner = &mut out[top * SIDE + left..];
+            match side {
+                8 => shares.write::<8>(full, corner),
+                4 => shares.write::<4>(full, corner),
+                2 => shares.write::<2>(full, corner),
+                _ => shares.write::<1>(full, corner),
             }
         }
     }
 }
 
-/// Adds `sign` to all slices up to `depth` (in slices from the near plane), in part to the one that it lies in.
+/// Cells along the side of the square that one tile of rays sees.
 #[inline(always)]
-fn gain(gains: &mut [f64], cells: usize, cell: usize, depth: f64, sign: f64) {
-    let depth = depth.clamp(0.0, SIDE as f64);
-    let slice = depth as usize;
-    let part = depth - slice as f64;
-    gains[slice * cells + cell] += sign * part;
-    if slice > 0 {
-        gains[(slice - 1) * cells + cell] += sign * (1.0 - part);
+fn cells_a_side(rays: usize) -> usize {
+    match rays {
+        1 => 8,
+        2 => 4,
+        3 | 4 => 2,
+        _ => 1,
     }
 }
 
-/// Sums up the gains of `side` x `side` cells from the far end, and clears them.
-#[inline(always)]
-fn write_cells(gains: &mut [f64], side: usize, full: f64, top: usize, left: usize, out: &mut [u8]) {
-    let cells = side * side;
-    let mut inside = [0.0; RAYS];
-    let mut bytes = [0u8; RAYS];
-    for slice in (0..SIDE + 1).rev() {
-        let gains = &mut gains[slice * cells..][..cells];
-        for ((inside, gain), byte) in inside.iter_mut().zip(gains).zip(&mut bytes) {
-            *inside += *gain;
-            *gain = 0.0;
-            *byte = (*inside * full + 0.5) as u8;
+/// The cell of each ray of a tile; the one after the last for rays that another tile casts as well.
+fn cells_of_rays(rays: usize, first_row: usize, first_col: usize) -> [usize; RAYS] {
+    let side = cells_a_side(rays);
+    std::array::from_fn(|r| {
+        let (row, col) = ((first_row + r / TILE) / rays, (first_col + r % TILE) / rays);
+        if row < side && col < side { row * side + col } else { RAYS }
+    })
+}
+
+/// How much of each cell of a square is inside, slice by slice.
+struct Shares {
+    /// For each slice and cell, how much more of it is inside than of the slice behind it. One cell is nobody's.
+    gains: Vec<[f64; RAYS + 1]>,
+    /// The slices with any gains.
+    slices: std::ops::Range<usize>,
+}
+
+impl Shares {
+    const NONE: std::ops::Range<usize> = SIDE..0;
+
+    fn new() -> Self {
+        Self { gains: vec![[0.0; RAYS + 1]; SIDE + 1], slices: Self::NONE }
+    }
+
+    /// Adds what lies between two depths, in slices from the near plane.
+    #[inline(always)]
+    fn add(&mut self, cell: usize, from: f64, to: f64) {
+        self.slices.start = self.slices.start.min((from as usize).saturating_sub(1));
+        self.slices.end = self.slices.end.max(to as usize + 1);
+        for (depth, sign) in [(to, 1.0), (from, -1.0)] {
+            // All slices before this depth, and in part the one that it lies in.
+            let slice = depth as usize;
+            let part = depth - slice as f64;
+            self.gains[slice][cell] += sign * part;
+            if slice > 0 {
+                self.gains[slice - 1][cell] += sign * (1.0 - part);
+            }
         }
-        if slice < SIDE {
-            for row in 0..side {
-                let at = (slice * SIDE + top + row) * SIDE + left;
-                out[at..at + side].copy_from_slice(&bytes[row * side..][..side]);
+    }
+
+    /// Sums up the gains of `N` x `N` cells from the far end, and clears them. `out` begins at the first cell.
+    #[inline(always)]
+    fn write<const N: usize>(&mut self, full: f64, out: &mut [u8]) {
+        let mut inside = [[0.0; N]; N];
+        for slice in std::mem::replace(&mut self.slices, Self::NONE).rev() {
+            let gains = &mut self.gains[slice];
+            let mut bytes = [[0; N]; N];
+            for row in 0..N {
+                for col in 0..N {
+                    inside[row][col] += std::mem::take(&mut gains[row * N + col]);
+                    bytes[row][col] = (inside[row][col] * full + 0.5) as i32 as u8;
+                }
+            }
+            if slice < SIDE {
+                for (row, bytes) in bytes.iter().enumerate() {
+                    out[(slice * SIDE + row) * SIDE..][..N].copy_from_slice(bytes);
+                }
             }
         }
     }

@@ -60,9 +60,11 @@ dispatched! {
         let mut tile = Tile::new(caster);
         draw_strips(IMAGE, config, ink, |top, strip| {
             cast_row(caster, &mut tile, IMAGE, top, |left, depth, normal| {
+                let [x, y, z] = normal;
                 for row in 0..TILE {
-                    let lanes = row * TILE..(row + 1) * TILE;
-                    strip.write(row, left, &depth[lanes.clone()], normal.each_ref().map(|n| &n[lanes.clone()]));
+                    let at = row * TILE..(row + 1) * TILE;
+                    let normal = [&x[at.clone()], &y[at.clone()], &z[at.clone()]];
+                    strip.write(row, left, &depth[at], normal);
                 }
             });
         });
@@ -74,8 +76,9 @@ dispatched! {
         draw_strips(buffers.size, config, ink, |top, strip| {
             for row in 0..TILE.min(buffers.size - top) {
                 let pixels = (top + row) * buffers.size..(top + row + 1) * buffers.size;
-                let normal = buffers.normal.each_ref().map(|n| &n[pixels.clone()]);
-                strip.write(row, 0, &buffers.depth[pixels.clone()], normal);
+                let [x, y, z] = &buffers.normal;
+                let normal = [&x[pixels.clone()], &y[pixels.clone()], &z[pixels.clone()]];
+                strip.write(row, 0, &buffers.depth[pixels], normal);
             }
         });
     }
@@ -141,9 +144,10 @@ impl Strip {
     #[inline(always)]
     fn block(&self, row: usize, at: usize) -> Block<'_> {
         let from = row * self.stride + at;
+        let [x, y, z] = &self.normal;
         Block {
             near: block(&self.near, from),
-            normal: self.normal.each_ref().map(|n| block(n, from)),
+            normal: [block(x, from), block(y, from), block(z, from)],
             rank: block(&self.rank, from),
         }
     }

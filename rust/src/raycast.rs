@@ -66,6 +66,9 @@ impl<'a> RayCaster<'a> {
 
 /// The rays of one tile, and where they are inside each of the primitives that they meet.
 pub struct Tile {
+    rows: [f64; TILE],
+    /// The primitives that may be seen in these rows.
+    candidates: Vec<usize>,
     /// One unit of depth along each ray, in the world.
     direction: [Lanes; 3],
     crossings: Vec<Crossing>,
@@ -73,7 +76,7 @@ pub struct Tile {
     met: usize,
 }
 
-/// Where each ray is inside a primitive: from one nearness to a lesser one. The first is 0 for a ray that misses it.
+/// Where each ray is inside a primitive: from one nearness to a lesser one; from 0 to `NEAREST` for a ray that misses it.
 #[derive(Clone)]
 struct Crossing {
     primitive: usize,
@@ -92,39 +95,49 @@ impl Tile {
     pub fn new(caster: &RayCaster) -> Self {
         let none = Crossing { primitive: 0, additive: true, start: [0.0; RAYS], end: [0.0; RAYS] };
         let crossings = vec![none; caster.primitives.len()];
-        Self { direction: [[0.0; RAYS]; 3], crossings, met: 0 }
+        Self { rows: [0.0; TILE], candidates: Vec::new(), direction: [[0.0; RAYS]; 3], crossings, met: 0 }
     }
 
-    /// Casts rays through the image at all of `xs` and `ys` (ascending, [-1, 1] units). Whether any meets anything.
+    /// Chooses the rows of the image (ascending, [-1, 1] units) that the tiles to come are in.
     #[inline(always)]
-    pub fn cast(&mut self, caster: &RayCaster, xs: &[f64; TILE], ys: &[f64; TILE]) -> bool {
+    pub fn choose(&mut self, caster: &RayCaster, rows: [f64; TILE]) {
+        let seen = |p: &Placed| (p.bounds[2] <= rows[TILE - 1]) & (rows[0] <= p.bounds[3]);
+        self.rows = rows;
+        self.candidates.clear();
+        self.candidates.extend((0..caster.primitives.len()).filter(|&i| seen(&caster.primitives[i])));
+    }
+
+    /// Casts rays through these columns of the chosen rows. Whether any meets anything.
+    #[inline(always)]
+    pub fn cast(&mut self, caster: &RayCaster, columns: &[f64; TILE]) -> bool {
         self.met = 0;
         let mut aimed = false;
-        for (index, placed) in caster.primitives.iter().enumerate() {
-            let [left, right, top, bottom] = placed.bounds;
-            let apart = (left > xs[TILE - 1]) | (right < xs[0]) | (top > ys[TILE - 1]) | (bottom < ys[0]);
+        for i in 0..self.candidates.len() {
+            let primitive = self.candidates[i];
+            let placed = &caster.primitives[primitive];
             let additive = placed.primitive.additive;
-            if apart || (self.met == 0 && !additive) {
+            let seen = (placed.bounds[0] <= columns[TILE - 1]) & (columns[0] <= placed.bounds[1]);
+            if !seen | ((self.met == 0) & !additive) {
                 continue;
             }
             if !aimed {
-                self.aim(caster.camera, xs, ys);
+                self.aim(caster.camera, columns);
                 aimed = true;
             }
             let crossing = &mut self.crossings[self.met];
-            (crossing.primitive, crossing.additive) = (index, additive);
+            (crossing.primitive, crossing.additive) = (primitive, additive);
             self.met += usize::from(cross(placed, &self.direction, &mut crossing.start, &mut crossing.end));
         }
         self.met > 0
     }
 
     #[inline(always)]
-    fn aim(&mut self, camera: &Camera, xs: &[f64; TILE], ys: &[f64; TILE]) {
+    fn aim(&mut self, camera: &Camera, columns: &[f64; TILE]) {
         let h = camera.half_image;
         for (axis, direction) in self.direction.iter_mut().enumerate() {
             let [right, down, forward] = camera.axes.map(|a| a[axis]);
-            for (row, y) in direction.as_chunks_mut::<TILE>().0.iter_mut().zip(ys) {
-                for (d, x) in row.iter_mut().zip(xs) {
+            for (row, y) in direction.as_chunks_mut::<TILE>().0.iter_mut().zip(&self.rows) {
+                for (d, x) in row.iter_mut().zip(columns) {
                     *d = right * (x * h) + down * (y * h) + forward;
                 }
             }
@@ -156,6 +169,18 @@ impl Tile {
             hits.offer(crossings, number, Some(from));
         }
         hits
+    }
+
+    /// Whether any ray may enter the shape again, having left it at `from`.
+    #[inline(always)]
+    pub fn goes_on(&self, from: &Lanes) -> bool {
+        let mut any = 0;
+        for crossing in self.crossings[..self.met].iter().filter(|c| c.additive) {
+            for r in 0..RAYS {
+                any |= u64::from(crossing.end[r] < from[r]);
+            }
+        }
+        any != 0
     }
 
     /// The unit normals in the world where rays meet the shape, turned towards the eye; 0 where they do not.
@@ -259,7 +284,8 @@ impl Hits {
     /// Moves points on until they lie in none of the crossings of one sign from number `first` on.
     #[inline(always)]
     fn push(&mut self, crossings: &[Crossing], first: usize, additive: bool) {
-        let mut moved = true;
+        let others = crossings.iter().skip(first).filter(|c| c.additive == additive).count();
+        let mut moved = others > 0;
         while moved {
             moved = false;
             for (number, c) in
@@ -274,7 +300,7 @@ impl Hits {
                     self.crossing[r] = if within { number as u64 } else { self.crossing[r] };
                     any |= u64::from(within);
                 }
-                moved |= any != 0;
+                moved |= (any != 0) & (others > 1);
             }
         }
     }
@@ -319,7 +345,9 @@ fn cross(placed: &Placed, direction: &[Lanes; 3], start: &mut Lanes, end: &mut L
     }
     let mut any = 0;
     for r in 0..RAYS {
-        start[r] = if start[r] > end[r] { start[r] } else { 0.0 };
+        let hit = start[r] > end[r];
+        start[r] = if hit { start[r] } else { 0.0 };
+        end[r] = if hit { end[r] } else { NEAREST };
         any |= start[r].to_bits();
     }
     any != 0
@@ -450,7 +478,8 @@ mod tests {
         let caster = RayCaster::new(shape, camera).unwrap();
         let mut tile = Tile::new(&caster);
         let from = |at: f64| std::array::from_fn(|i| at + 0.03 * i as f64);
-        tile.cast(&caster, &from(x), &from(y));
+        tile.choose(&caster, from(y));
+        tile.cast(&caster, &from(x));
         (caster, tile)
     }
 
