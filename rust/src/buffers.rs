@@ -11,8 +11,8 @@ use crate::voxel::{CELLS, SIDE};
 pub struct Buffers {
     /// Depth along the camera's z axis in world units; infinite where nothing is seen.
     pub depth: Vec<f32>,
-    /// Unit normal in the world, towards the eye, by its components; zero where nothing is seen.
-    pub normal: [Vec<f32>; 3],
+    /// Unit normal in the world, towards the eye; zero where nothing is seen.
+    pub normal: Vec<[f32; 3]>,
     /// Pixels along each side.
     pub size: usize,
 }
@@ -22,7 +22,7 @@ impl Buffers {
     pub fn of_shape(shape: &Shape, camera: &Camera, size: usize) -> Result<Self, CoreError> {
         let caster = RayCaster::new(shape, camera)?;
         let depth = vec![f32::INFINITY; size * size];
-        let normal = [(); 3].map(|()| vec![0.0; size * size]);
+        let normal = vec![[0.0; 3]; size * size];
         let mut buffers = Self { depth, normal, size };
         cast_image(&caster, &mut buffers);
         Ok(buffers)
@@ -31,50 +31,84 @@ impl Buffers {
 
 dispatched! {
     fn cast_image(caster: &RayCaster, buffers: &mut Buffers) {
-        let size = buffers.size;
-        let mut tile = Tile::new(caster);
-        for top in (0..size).step_by(TILE) {
-            cast_row(caster, &mut tile, size, top, |left, depth, normal| {
-                let all = buffers.normal.iter_mut().zip(normal).chain([(&mut buffers.depth, depth)]);
-                for (out, lanes) in all {
-                    for (row, lanes) in (top..size).zip(lanes.as_chunks::<TILE>().0) {
-                        let out = &mut out[row * size + left..(row + 1) * size];
-                        out.iter_mut().zip(lanes).for_each(|(out, &lane)| *out = lane);
-                    }
+        cast_tiles(caster, buffers);
+    }
+}
+
+#[inline(always)]
+fn cast_tiles(caster: &RayCaster, buffers: &mut Buffers) {
+    let size = buffers.size;
+    let mut tile = Tile::new(caster);
+    for top in (0..size).step_by(TILE) {
+        tile.choose(caster, &image_points(top, size));
+        for left in (0..size).step_by(TILE) {
+            let Some(Pixels { depth, normal }) = Pixels::seen(caster, &mut tile, &image_points(left, size))
+            else {
+                continue;
+            };
+            for (row, lanes) in (top..size).zip((0..RAYS).step_by(TILE)) {
+                for (col, lane) in (left..size).zip(lanes..lanes + TILE) {
+                    buffers.depth[row * size + col] = depth[lane];
+                    buffers.normal[row * size + col] = [normal[0][lane], normal[1][lane], normal[2][lane]];
                 }
-            });
+            }
         }
     }
 }
 
-/// Casts a row of tiles, `top` the first row of its pixels, and gives each that sees something to `write`: its first
-/// column, depths and normals.
-#[inline(always)]
-pub fn cast_row(
-    caster: &RayCaster,
-    tile: &mut Tile,
-    size: usize,
-    top: usize,
-    mut write: impl FnMut(usize, &[f32; RAYS], &[[f32; RAYS]; 3]),
-) {
-    tile.choose(caster, image_points(top, size));
-    for left in (0..size).step_by(TILE) {
-        if tile.cast(caster, &image_points(left, size)) {
-            let hits = tile.entries(None);
-            let (depth, normals) = (hits.depth(), tile.normals(caster, &hits));
-            let mut narrow = [[0.0; RAYS]; 4];
-            for (narrow, wide) in narrow.iter_mut().zip([&depth, &normals[0], &normals[1], &normals[2]]) {
-                narrow.iter_mut().zip(wide).for_each(|(narrow, &wide)| *narrow = wide as f32);
-            }
-            let [depth, normals @ ..] = &narrow;
-            write(left, depth, normals);
+/// What is seen in one tile, row by row, as in `Buffers`.
+pub struct Pixels {
+    pub depth: [f32; RAYS],
+    pub normal: [[f32; RAYS]; 3],
+}
+
+impl Pixels {
+    /// What the chosen rows of a tile show at these columns; `None` if there is nothing.
+    #[inline(always)]
+    pub fn seen(caster: &RayCaster, tile: &mut Tile, columns: &[f64; TILE]) -> Option<Self> {
+        if !tile.cast(caster, columns) {
+            return None;
         }
+        let hits = tile.entries(None);
+        let (depth, normal) = (hits.depth(), tile.normals(caster, &hits));
+        let mut pixels = Self { depth: [0.0; RAYS], normal: [[0.0; RAYS]; 3] };
+        for r in 0..RAYS {
+            pixels.depth[r] = depth[r] as f32;
+            for axis in 0..3 {
+                pixels.normal[axis][r] = normal[axis][r] as f32;
+            }
+        }
+        Some(pixels)
+    }
+}
+
+impl Buffers {
+    /// The tile whose first pixel is in this column and row, blank beyond the image; `None` if it shows nothing.
+    #[inline(always)]
+    pub fn tile(&self, left: usize, top: usize) -> Option<Pixels> {
+        let mut pixels = Pixels { depth: [f32::INFINITY; RAYS], normal: [[0.0; RAYS]; 3] };
+        let mut seen = false;
+        for row in 0..TILE.min(self.size - top) {
+            let from = (top + row) * self.size + left;
+            let to = from + TILE.min(self.size - left);
+            let (depth, normal) = (&self.depth[from..to], &self.normal[from..to]);
+            if depth.iter().fold(true, |blank, &d| blank & (d == f32::INFINITY)) {
+                continue;
+            }
+            seen = true;
+            for col in 0..depth.len() {
+                let lane = row * TILE + col;
+                pixels.depth[lane] = depth[col];
+                [pixels.normal[0][lane], pixels.normal[1][lane], pixels.normal[2][lane]] = normal[col];
+            }
+        }
+        seen.then_some(pixels)
     }
 }
 
 /// The middles of `TILE` pixels from `first` on, of `size` along the side of the image, in [-1, 1] units.
 #[inline(always)]
-fn image_points(first: usize, size: usize) -> [f64; TILE] {
+pub fn image_points(first: usize, size: usize) -> [f64; TILE] {
     std::array::from_fn(|i| (2 * (first + i).min(size - 1) + 1) as f64 / size as f64 - 1.0)
 }
 
@@ -101,7 +135,6 @@ fn fill_tiles(caster: &RayCaster, rays: usize, out: &mut [u8]) {
     let (size, side) = (SIDE * rays, cells_a_side(rays));
     let camera = caster.camera();
     let per_slice = SIDE as f64 / (camera.far - camera.near);
-    let slices = |depth: f64| ((depth - camera.near) * per_slice).clamp(0.0, SIDE as f64);
     let full = 255.0 / (rays * rays) as f64;
     // The first ray of each tile, and the cell that each of its rays is in.
     let steps = || (0..side * rays).step_by(TILE);
@@ -114,7 +147,7 @@ fn fill_tiles(caster: &RayCaster, rays: usize, out: &mut [u8]) {
     for top in (0..SIDE).step_by(side) {
         for left in (0..SIDE).step_by(side) {
             for (first_row, first_col, cells) in &parts {
-                tile.choose(caster, image_points(top * rays + first_row, size));
+                tile.choose(caster, &image_points(top * rays + first_row, size));
                 if !tile.cast(caster, &image_points(left * rays + first_col, size)) {
                     continue;
                 }
@@ -122,8 +155,15 @@ fn fill_tiles(caster: &RayCaster, rays: usize, out: &mut [u8]) {
                 loop {
                     let exits = tile.exits(&entries.nearness);
                     let (start, end) = (entries.depth(), exits.depth());
-                    for r in (0..RAYS).filter(|&r| start[r] < f64::INFINITY) {
-                        shares.add(cells[r], slices(start[r]), slices(end[r]));
+                    let (mut from, mut to) = ([0.0; RAYS], [0.0; RAYS]);
+                    for r in 0..RAYS {
+                        from[r] = ((start[r] - camera.near) * per_slice).clamp(0.0, SIDE as f64);
+                        to[r] = ((end[r] - camera.near) * per_slice).clamp(0.0, SIDE as f64);
+                    }
+                    for r in 0..RAYS {
+                        if from[r] < to[r] {
+                            shares.add(cells[r], from[r], to[r]);
+                        }
                     }
                     if !tile.goes_on(&exits.nearness) {
                         break;
@@ -218,7 +258,10 @@ impl Shares {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::VIEWPOINTS;
     use crate::csg::{Kind, Primitive};
+    use crate::grammar::GrammarConfig;
+    use crate::random::Random;
     use glam::DVec3;
 
     fn one(kind: Kind, half: [f64; 3]) -> Shape {
@@ -235,7 +278,7 @@ mod tests {
         // The face is 0.6 wide at depth 1.8; the image is 2 * 1.8 * tan(22.5 degrees) there.
         let pixels = 0.6 / (3.6 * 22.5f64.to_radians().tan()) * 256.0;
         assert!((hits.count() as f64 - pixels * pixels).abs() < 4.0 * pixels);
-        assert_eq!([0, 1, 2].map(|axis| buffers.normal[axis][128 * 256 + 128]), [1.0, 0.0, 0.0]);
+        assert_eq!(buffers.normal[128 * 256 + 128], [1.0, 0.0, 0.0]);
     }
 
     #[test]
@@ -260,6 +303,28 @@ mod tests {
                 })
                 .sum();
             assert!((volume / exact - 1.0).abs() < 0.004, "{volume} {exact}");
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_sees_the_same() {
+        let grammar = GrammarConfig { wedges: 0.2, ..GrammarConfig::default() };
+        for (i, (azimuth, elevation)) in (0..).zip(VIEWPOINTS) {
+            let (shape, _) = grammar.draw(&mut Random::new(5, i, 0)).unwrap();
+            let camera = Camera::orbit(azimuth, elevation, 0.0, 2.0);
+            let caster = RayCaster::new(&shape, &camera).unwrap();
+            let best = Buffers::of_shape(&shape, &camera, 100).unwrap();
+            let mut baseline =
+                Buffers { depth: vec![f32::INFINITY; 10_000], normal: vec![[0.0; 3]; 10_000], size: 100 };
+            cast_tiles(&caster, &mut baseline);
+            assert!(best.depth == baseline.depth && best.normal == baseline.normal);
+            let (mut best, mut baseline) = (vec![0; CELLS], vec![0; CELLS]);
+            for rays in 1..=9 {
+                fill_frustum(&shape, &camera, rays, &mut best).unwrap();
+                baseline.fill(0);
+                fill_tiles(&caster, rays, &mut baseline);
+                assert!(best == baseline);
+            }
         }
     }
 

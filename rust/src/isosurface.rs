@@ -47,8 +47,7 @@ pub fn cast(volume: &[f32], level: f32, camera: &Camera, size: usize) -> Buffers
             (f32::INFINITY, [0.0; 3])
         })
         .collect();
-    let depth = pixels.iter().map(|p| p.0).collect();
-    let normal = [0, 1, 2].map(|axis| pixels.iter().map(|p| p.1[axis]).collect());
+    let (depth, normal) = pixels.into_iter().unzip();
     Buffers { depth, normal, size }
 }
 
@@ -79,7 +78,7 @@ mod tests {
         let middle = 32 * 65 + 32;
         assert!((f64::from(seen.depth[middle]) - (2.0 - radius)).abs() < 1e-3, "{}", seen.depth[middle]);
         let away = camera.position.normalize().as_vec3();
-        assert!(Vec3::from([0, 1, 2].map(|axis| seen.normal[axis][middle])).dot(away) > 0.999);
+        assert!(Vec3::from(seen.normal[middle]).dot(away) > 0.999);
         assert_eq!(seen.depth[0], f32::INFINITY);
         // The outline of a ball at distance 2: sin of its angle is radius / 2.
         let tangent = (radius / 2.0).asin().tan() / camera.half_image * 65.0 / 2.0;

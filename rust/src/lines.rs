@@ -5,12 +5,12 @@
 //! beside the background is a line: so outlines are closed, and the background, flooded over its four-connected
 //! neighbours from the border, never gets in.
 
-use crate::buffers::{Buffers, cast_row};
+use crate::buffers::{Buffers, Pixels, image_points};
 use crate::camera::{Camera, IMAGE};
 use crate::csg::Shape;
 use crate::dispatch::dispatched;
 use crate::error::CoreError;
-use crate::raycast::{RayCaster, TILE, Tile};
+use crate::raycast::{RAYS, RayCaster, TILE, Tile};
 use serde::{Deserialize, Serialize};
 
 /// When a change of depth or normal is a line.
@@ -57,31 +57,49 @@ pub fn detect(buffers: &Buffers, config: &LineConfig, ink: &mut [u8]) {
 
 dispatched! {
     fn draw_seen(caster: &RayCaster, config: &LineConfig, ink: &mut [u8]) {
-        let mut tile = Tile::new(caster);
-        draw_strips(IMAGE, config, ink, |top, strip| {
-            cast_row(caster, &mut tile, IMAGE, top, |left, depth, normal| {
-                let [x, y, z] = normal;
-                for row in 0..TILE {
-                    let at = row * TILE..(row + 1) * TILE;
-                    let normal = [&x[at.clone()], &y[at.clone()], &z[at.clone()]];
-                    strip.write(row, left, &depth[at], normal);
-                }
-            });
-        });
+        draw_tiles(caster, config, ink);
     }
 }
 
 dispatched! {
     fn draw_buffers(buffers: &Buffers, config: &LineConfig, ink: &mut [u8]) {
-        draw_strips(buffers.size, config, ink, |top, strip| {
-            for row in 0..TILE.min(buffers.size - top) {
-                let pixels = (top + row) * buffers.size..(top + row + 1) * buffers.size;
-                let [x, y, z] = &buffers.normal;
-                let normal = [&x[pixels.clone()], &y[pixels.clone()], &z[pixels.clone()]];
-                strip.write(row, 0, &buffers.depth[pixels], normal);
-            }
-        });
+        draw_rows(buffers, config, ink);
     }
+}
+
+#[inline(always)]
+fn draw_tiles(caster: &RayCaster, config: &LineConfig, ink: &mut [u8]) {
+    let mut tile = Tile::new(caster);
+    let mut strip = Strip::new(IMAGE);
+    for top in (0..IMAGE).step_by(TILE) {
+        strip.advance();
+        tile.choose(caster, &image_points(top, IMAGE));
+        for left in (0..IMAGE).step_by(TILE) {
+            if let Some(pixels) = Pixels::seen(caster, &mut tile, &image_points(left, IMAGE)) {
+                strip.write(left, &pixels);
+            }
+        }
+        strip.draw(top, config, ink);
+    }
+    strip.advance();
+    strip.draw(IMAGE, config, ink);
+}
+
+#[inline(always)]
+fn draw_rows(buffers: &Buffers, config: &LineConfig, ink: &mut [u8]) {
+    let size = buffers.size;
+    let mut strip = Strip::new(size);
+    for top in (0..size).step_by(TILE) {
+        strip.advance();
+        for left in (0..size).step_by(TILE) {
+            if let Some(pixels) = buffers.tile(left, top) {
+                strip.write(left, &pixels);
+            }
+        }
+        strip.draw(top, config, ink);
+    }
+    strip.advance();
+    strip.draw(size.next_multiple_of(TILE), config, ink);
 }
 
 /// Pixels that are looked at together.
@@ -89,121 +107,143 @@ const BLOCK: usize = 16;
 /// Rows of the strip before whose lines, or whose neighbours' lines, wait for the strip that follows.
 const OVERLAP: usize = 2;
 
-/// Some rows of an image, of what lines are found in; with a pixel of background at both ends of each.
+/// Some rows of an image, of what lines are found in.
 ///
 /// A strip goes through the image from top to bottom, so that it stays in the nearest caches.
 struct Strip {
-    /// From one row to the next.
+    size: usize,
+    /// Row by row, with a block of background at both ends of each.
+    blocks: Vec<Block>,
+    /// Blocks from one row to the next.
     stride: usize,
-    /// Inverse depth; 0 where nothing is seen.
-    near: Vec<f32>,
-    /// Anything where nothing is seen.
-    normal: [Vec<f32>; 3],
-    /// The share of `FACE_ORDER` in the normal.
-    rank: Vec<f32>,
+    /// The ink that the row above leaves on the row to be drawn next.
+    beneath: Vec<[u8; BLOCK]>,
 }
 
 /// Pixels side by side.
-struct Block<'a> {
-    near: &'a [f32; BLOCK],
-    normal: [&'a [f32; BLOCK]; 3],
-    rank: &'a [f32; BLOCK],
+#[derive(Clone, Copy)]
+struct Block {
+    /// Inverse depth; 0 where nothing is seen.
+    near: [f32; BLOCK],
+    /// Anything where nothing is seen.
+    normal: [[f32; BLOCK]; 3],
+    /// The share of `FACE_ORDER` in the normal.
+    rank: [f32; BLOCK],
 }
 
 impl Strip {
     fn new(size: usize) -> Self {
-        let stride = size.next_multiple_of(BLOCK) + 2;
-        let blank = vec![0.0; (OVERLAP + TILE) * stride];
-        Self { stride, near: blank.clone(), normal: [(); 3].map(|()| blank.clone()), rank: blank }
+        let stride = size.div_ceil(BLOCK) + 2;
+        let blank = [0.0; BLOCK];
+        let blank = Block { near: blank, normal: [blank; 3], rank: blank };
+        let blocks = vec![blank; (OVERLAP + TILE) * stride];
+        Self { size, blocks, stride, beneath: vec![[0; BLOCK]; stride] }
     }
 
     /// Keeps the last rows as the first, and clears the others.
     #[inline(always)]
     fn advance(&mut self) {
-        for values in self.normal.iter_mut().chain([&mut self.near, &mut self.rank]) {
-            values.copy_within(TILE * self.stride.., 0);
+        self.blocks.copy_within(TILE * self.stride.., 0);
+        for block in &mut self.blocks[OVERLAP * self.stride..] {
+            block.near = [0.0; BLOCK];
         }
-        self.near[OVERLAP * self.stride..].fill(0.0);
     }
 
-    /// Puts pixels into one of the new rows, from a column on.
+    /// Puts a tile of pixels into the new rows, from a column on.
     #[inline(always)]
-    fn write(&mut self, row: usize, col: usize, depth: &[f32], normal: [&[f32]; 3]) {
-        let from = (OVERLAP + row) * self.stride + 1 + col;
-        let new = from..from + depth.len();
-        self.near[new.clone()].iter_mut().zip(depth).for_each(|(near, depth)| *near = 1.0 / depth);
-        for (own, normal) in self.normal.iter_mut().zip(normal) {
-            own[new.clone()].copy_from_slice(normal);
+    fn write(&mut self, left: usize, pixels: &Pixels) {
+        let Pixels { depth, normal } = pixels;
+        let (mut near, mut rank) = ([0.0; RAYS], [0.0; RAYS]);
+        for i in 0..RAYS {
+            near[i] = 1.0 / depth[i];
+            rank[i] = dot([normal[0][i], normal[1][i], normal[2][i]], FACE_ORDER);
         }
-        let ranks = self.rank[new].iter_mut();
-        let normals = normal[0].iter().zip(normal[1]).zip(normal[2]);
-        ranks.zip(normals).for_each(|(rank, ((&x, &y), &z))| *rank = dot([x, y, z], FACE_ORDER));
+        for row in 0..TILE {
+            let block = &mut self.blocks[(OVERLAP + row) * self.stride + 1 + left / BLOCK];
+            let part = left % BLOCK / TILE;
+            let Block { near: own_near, normal: [x, y, z], rank: own_rank } = block;
+            let [nx, ny, nz] = normal;
+            for (values, own) in [(&near, own_near), (nx, x), (ny, y), (nz, z), (&rank, own_rank)] {
+                own.as_chunks_mut::<TILE>().0[part] = values.as_chunks::<TILE>().0[row];
+            }
+        }
     }
 
-    /// Pixels of one row from `at` on; 0 is the one before the image.
+    /// Draws the rows that have all of their neighbours, of the strip whose first new row is `top`.
     #[inline(always)]
-    fn block(&self, row: usize, at: usize) -> Block<'_> {
-        let from = row * self.stride + at;
-        let [x, y, z] = &self.normal;
-        Block {
-            near: block(&self.near, from),
-            normal: [block(x, from), block(y, from), block(z, from)],
-            rank: block(&self.rank, from),
-        }
-    }
-}
-
-#[inline(always)]
-fn block(values: &[f32], from: usize) -> &[f32; BLOCK] {
-    values[from..].first_chunk().expect("rows are whole blocks")
-}
-
-/// Draws strip by strip; `fill` writes the rows from the given one on into a strip that is clear.
-#[inline(always)]
-fn draw_strips(size: usize, config: &LineConfig, ink: &mut [u8], mut fill: impl FnMut(usize, &mut Strip)) {
-    let cos_crease = config.crease_degrees.to_radians().cos();
-    let crease = |first: &Block, second: &Block| creases(first, second, cos_crease, config.depth_step);
-    let mut strip = Strip::new(size);
-    // What a row's pixels leave on themselves, on the ones to the right, and on the ones below.
-    let [mut own, mut right, mut below, mut above] = [(); 4].map(|()| vec![0u8; strip.stride]);
-    // Once more than there are strips, for the last row.
-    for top in (0..=size).step_by(TILE) {
-        strip.advance();
-        if top < size {
-            fill(top, &mut strip);
-        }
-        for row in top.max(1) - 1..size.min(top + TILE - 1) {
-            let at = row + OVERLAP - top;
-            for col in (0..size).step_by(BLOCK) {
-                let here = strip.block(at, col + 1);
-                let (mut marks, mut beside, mut beneath) = ([0; BLOCK], [0; BLOCK], [0; BLOCK]);
-                if here.near.iter().fold(0, |any, near| any | near.to_bits()) != 0 {
-                    let (next, under) = (strip.block(at, col + 2), strip.block(at + 1, col + 1));
-                    let around = [block(&strip.near, at * strip.stride + col), next.near];
-                    let across = [block(&strip.near, (at - 1) * strip.stride + col + 1), under.near];
-                    marks = outlines(here.near, [around, across], config.depth_step);
-                    let creases = [crease(&here, &next), crease(&here, &under)];
-                    (0..BLOCK).for_each(|i| marks[i] |= creases[0].0[i] | creases[1].0[i]);
-                    (beside, beneath) = (creases[0].1, creases[1].1);
+    fn draw(&mut self, top: usize, config: &LineConfig, ink: &mut [u8]) {
+        let cos_crease = config.crease_degrees.to_radians().cos();
+        for row in top.max(1) - 1..self.size.min(top + TILE - 1) {
+            let mut beside = [0; BLOCK];
+            for k in 1..self.stride - 1 {
+                let at = (row + OVERLAP - top) * self.stride + k;
+                let here = &self.blocks[at];
+                let mut marks = self.beneath[k];
+                if here.near.iter().fold(0, |any, near| any | near.to_bits()) == 0 {
+                    (marks, beside, self.beneath[k]) = ([0; BLOCK], [0; BLOCK], [0; BLOCK]);
+                } else {
+                    let (above, below) = (&self.blocks[at - self.stride], &self.blocks[at + self.stride]);
+                    let right = here.shifted(&self.blocks[at + 1]);
+                    let left = shifted_back(&self.blocks[at - 1].near, &here.near);
+                    let step = config.depth_step;
+                    let (sideways, upright) =
+                        (creases(here, &right, cos_crease, step), creases(here, below, cos_crease, step));
+                    let passed_on = shifted_back(&beside, &sideways.1);
+                    let outlines = outlines(&here.near, [&left, &right.near, &above.near, &below.near], step);
+                    for i in 0..BLOCK {
+                        marks[i] |= outlines[i] | passed_on[i] | sideways.0[i] | upright.0[i];
+                    }
+                    (beside, self.beneath[k]) = (sideways.1, upright.1);
                 }
-                own[col..col + BLOCK].copy_from_slice(&marks);
-                right[col + 1..col + 1 + BLOCK].copy_from_slice(&beside);
-                below[col..col + BLOCK].copy_from_slice(&beneath);
+                let from = (k - 1) * BLOCK;
+                let ink = &mut ink[row * self.size + from..(row + 1) * self.size];
+                match ink.first_chunk_mut() {
+                    Some(whole) => *whole = marks,
+                    None => ink.copy_from_slice(&marks[..ink.len()]),
+                }
             }
-            for (i, ink) in ink[row * size..(row + 1) * size].iter_mut().enumerate() {
-                *ink = own[i] | right[i] | above[i];
-            }
-            std::mem::swap(&mut above, &mut below);
         }
     }
 }
 
-/// Ink on outlines and on steps of depth, from the pixels before and behind along either axis.
+impl Block {
+    /// The pixels to the right of these, `next` being the block there.
+    #[inline(always)]
+    fn shifted(&self, next: &Self) -> Self {
+        Self {
+            near: shifted(&self.near, &next.near),
+            normal: [
+                shifted(&self.normal[0], &next.normal[0]),
+                shifted(&self.normal[1], &next.normal[1]),
+                shifted(&self.normal[2], &next.normal[2]),
+            ],
+            rank: shifted(&self.rank, &next.rank),
+        }
+    }
+}
+
+/// All values but the first, and the first of the block that follows.
 #[inline(always)]
-fn outlines(here: &[f32; BLOCK], pairs: [[&[f32; BLOCK]; 2]; 2], depth_step: f32) -> [u8; BLOCK] {
+fn shifted<T: Copy>(values: &[T; BLOCK], next: &[T; BLOCK]) -> [T; BLOCK] {
+    let mut result = [next[0]; BLOCK];
+    result[..BLOCK - 1].copy_from_slice(&values[1..]);
+    result
+}
+
+/// The last value of the block before, and all but the last.
+#[inline(always)]
+fn shifted_back<T: Copy>(last: &[T; BLOCK], values: &[T; BLOCK]) -> [T; BLOCK] {
+    let mut result = [last[BLOCK - 1]; BLOCK];
+    result[1..].copy_from_slice(&values[..BLOCK - 1]);
+    result
+}
+
+/// Ink on outlines and on steps of depth, from what is to the left, to the right, above and below.
+#[inline(always)]
+fn outlines(here: &[f32; BLOCK], around: [&[f32; BLOCK]; 4], depth_step: f32) -> [u8; BLOCK] {
     let mut ink = [0; BLOCK];
     for i in 0..BLOCK {
-        let [[left, right], [above, below]] = pairs.map(|pair| pair.map(|near| near[i]));
+        let (left, right, above, below) = (around[0][i], around[1][i], around[2][i], around[3][i]);
         let outline = (left == 0.0) | (right == 0.0) | (above == 0.0) | (below == 0.0);
         let step = (2.0 * here[i] - left - right > depth_step) | (2.0 * here[i] - above - below > depth_step);
         ink[i] = if (here[i] != 0.0) & (outline | step) { 255 } else { 0 };
@@ -217,8 +257,9 @@ fn outlines(here: &[f32; BLOCK], pairs: [[&[f32; BLOCK]; 2]; 2], depth_step: f32
 #[inline(always)]
 fn creases(first: &Block, second: &Block, cos_crease: f32, depth_step: f32) -> ([u8; BLOCK], [u8; BLOCK]) {
     let (mut one, mut other) = ([0; BLOCK], [0; BLOCK]);
+    let ([a, b, c], [x, y, z]) = (&first.normal, &second.normal);
     for i in 0..BLOCK {
-        let cosine = dot(first.normal.map(|n| n[i]), second.normal.map(|n| n[i]));
+        let cosine = dot([a[i], b[i], c[i]], [x[i], y[i], z[i]]);
         let crease = (first.near[i] != 0.0) & (second.near[i] != 0.0) & (cosine < cos_crease);
         let ahead = first.near[i] - second.near[i];
         let level = (ahead <= depth_step) & (-ahead <= depth_step);
@@ -240,6 +281,9 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::VIEWPOINTS;
+    use crate::grammar::GrammarConfig;
+    use crate::random::Random;
 
     /// A size x size image from rows of characters: '.' background, digits distances, with one normal a digit.
     fn picture(rows: &[&str]) -> Buffers {
@@ -250,9 +294,7 @@ mod tests {
             depth: cells()
                 .map(|c| if c == b'.' { f32::INFINITY } else { 2.0 + 0.1 * digit(c) as f32 })
                 .collect(),
-            normal: [0, 1, 2].map(|axis| {
-                cells().map(|c| if c == b'.' { 0.0 } else { normals[digit(c) % 3][axis] }).collect()
-            }),
+            normal: cells().map(|c| if c == b'.' { [0.0; 3] } else { normals[digit(c) % 3] }).collect(),
             size: rows.len(),
         }
     }
@@ -270,9 +312,21 @@ mod tests {
             .collect()
     }
 
-    fn turn_up(buffers: &mut Buffers, pixel: usize) {
-        for (axis, value) in [0.0, 1.0, 0.0].into_iter().enumerate() {
-            buffers.normal[axis][pixel] = value;
+    #[test]
+    fn every_instruction_set_draws_the_same() {
+        let (config, grammar) =
+            (LineConfig::default(), GrammarConfig { wedges: 0.2, ..GrammarConfig::default() });
+        for (i, (azimuth, elevation)) in (0..).zip(VIEWPOINTS) {
+            let (shape, _) = grammar.draw(&mut Random::new(6, i, 0)).unwrap();
+            let camera = Camera::orbit(azimuth, elevation, 0.0, 2.0);
+            let (mut best, mut baseline) = (vec![1; IMAGE * IMAGE], vec![2; IMAGE * IMAGE]);
+            draw(&shape, &camera, &config, &mut best).unwrap();
+            draw_tiles(&RayCaster::new(&shape, &camera).unwrap(), &config, &mut baseline);
+            assert!(best.contains(&255) && best == baseline);
+            let buffers = Buffers::of_shape(&shape, &camera, IMAGE).unwrap();
+            assert!(best == ink(&buffers, &config));
+            draw_rows(&buffers, &config, &mut baseline);
+            assert!(best == baseline);
         }
     }
 
@@ -300,7 +354,7 @@ mod tests {
         let mut buffers = picture(&["0000000"; 7]);
         for row in 0..7 {
             for col in 4..7 {
-                turn_up(&mut buffers, row * 7 + col);
+                buffers.normal[row * 7 + col] = [0.0, 1.0, 0.0];
             }
         }
         // The face whose normal points up carries it.
@@ -315,7 +369,7 @@ mod tests {
             for row in 0..9 {
                 for col in 0..9 {
                     if (if rising { 8 - row } else { row }) < col {
-                        turn_up(&mut buffers, row * 9 + col);
+                        buffers.normal[row * 9 + col] = [0.0, 1.0, 0.0];
                     }
                 }
             }

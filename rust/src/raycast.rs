@@ -100,11 +100,14 @@ impl Tile {
 
     /// Chooses the rows of the image (ascending, [-1, 1] units) that the tiles to come are in.
     #[inline(always)]
-    pub fn choose(&mut self, caster: &RayCaster, rows: [f64; TILE]) {
-        let seen = |p: &Placed| (p.bounds[2] <= rows[TILE - 1]) & (rows[0] <= p.bounds[3]);
-        self.rows = rows;
+    pub fn choose(&mut self, caster: &RayCaster, rows: &[f64; TILE]) {
+        self.rows = *rows;
         self.candidates.clear();
-        self.candidates.extend((0..caster.primitives.len()).filter(|&i| seen(&caster.primitives[i])));
+        for (index, placed) in caster.primitives.iter().enumerate() {
+            if (placed.bounds[2] <= rows[TILE - 1]) & (rows[0] <= placed.bounds[3]) {
+                self.candidates.push(index);
+            }
+        }
     }
 
     /// Casts rays through these columns of the chosen rows. Whether any meets anything.
@@ -136,9 +139,10 @@ impl Tile {
         let h = camera.half_image;
         for (axis, direction) in self.direction.iter_mut().enumerate() {
             let [right, down, forward] = camera.axes.map(|a| a[axis]);
-            for (row, y) in direction.as_chunks_mut::<TILE>().0.iter_mut().zip(&self.rows) {
-                for (d, x) in row.iter_mut().zip(columns) {
-                    *d = right * (x * h) + down * (y * h) + forward;
+            for row in 0..TILE {
+                for col in 0..TILE {
+                    let (x, y) = (columns[col] * h, self.rows[row] * h);
+                    direction[row * TILE + col] = right * x + down * y + forward;
                 }
             }
         }
@@ -478,7 +482,7 @@ mod tests {
         let caster = RayCaster::new(shape, camera).unwrap();
         let mut tile = Tile::new(&caster);
         let from = |at: f64| std::array::from_fn(|i| at + 0.03 * i as f64);
-        tile.choose(&caster, from(y));
+        tile.choose(&caster, &from(y));
         tile.cast(&caster, &from(x));
         (caster, tile)
     }

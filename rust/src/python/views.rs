@@ -68,9 +68,7 @@ pub fn isosurface<'py>(
 fn buffer_arrays<'py>(py: Python<'py>, made: Buffers) -> PyResult<BufferArrays<'py>> {
     let size = made.size;
     let depth = made.depth.into_pyarray(py).reshape([size, size])?;
-    let [x, y, z] = &made.normal;
-    let normal: Vec<[f32; 3]> = x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z]).collect();
-    let normal = normal.into_flattened().into_pyarray(py).reshape([size, size, 3])?;
+    let normal = made.normal.into_flattened().into_pyarray(py).reshape([size, size, 3])?;
     Ok((depth, normal))
 }
 
@@ -85,9 +83,8 @@ pub fn lines<'py>(
     let size = check_size(depth.shape().first().map_or(0, |&s| s as i64))?;
     let side = size as isize;
     let depth = checked(&depth, "depth", &[side, side])?.to_vec();
-    let normal = checked(&normal, "normal", &[side, side, 3])?;
-    all_finite(normal, "normal")?;
-    let normal = [0, 1, 2].map(|axis| normal.iter().skip(axis).step_by(3).copied().collect());
+    let normal = checked(&normal, "normal", &[side, side, 3])?.as_chunks::<3>().0.to_vec();
+    all_finite(normal.as_flattened(), "normal")?;
     if depth.iter().any(|d| d.is_nan() || *d <= 0.0) {
         let message = "depth must be more than 0 everywhere, infinite where nothing is seen";
         return Err(PyValueError::new_err(message));
