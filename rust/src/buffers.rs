@@ -1,8 +1,10 @@
 //! Depth and normal buffers, and the fractional camera grid: both by casting rays at the shape itself.
 
+#![expect(clippy::needless_range_loop, reason = "loops over the rays of a tile index many arrays at once")]
+
 use crate::camera::Camera;
 use crate::csg::Shape;
-use crate::dispatch::dispatched;
+use crate::dispatch::for_each_instruction_set;
 use crate::error::CoreError;
 use crate::raycast::{RAYS, RayCaster, TILE, Tile};
 use crate::voxel::{CELLS, SIDE};
@@ -29,7 +31,7 @@ impl Buffers {
     }
 }
 
-dispatched! {
+for_each_instruction_set! {
     fn cast_image(caster: &RayCaster, buffers: &mut Buffers) {
         cast_tiles(caster, buffers);
     }
@@ -123,7 +125,7 @@ pub fn fill_frustum(shape: &Shape, camera: &Camera, rays: usize, out: &mut [u8])
     Ok(())
 }
 
-dispatched! {
+for_each_instruction_set! {
     fn fill_cells(caster: &RayCaster, rays: usize, out: &mut [u8]) {
         fill_tiles(caster, rays, out);
     }
@@ -206,22 +208,22 @@ fn cells_of_rays(rays: usize, first_row: usize, first_col: usize) -> [usize; RAY
 struct Shares {
     /// For each slice and cell, how much more of it is inside than of the slice behind it. One cell is nobody's.
     gains: Vec<[f64; RAYS + 1]>,
-    /// The slices with any gains.
-    slices: std::ops::Range<usize>,
+    /// The first slice with any gains, and the one after the last.
+    slices: [usize; 2],
 }
 
 impl Shares {
-    const NONE: std::ops::Range<usize> = SIDE..0;
+    const NO_SLICES: [usize; 2] = [SIDE, 0];
 
     fn new() -> Self {
-        Self { gains: vec![[0.0; RAYS + 1]; SIDE + 1], slices: Self::NONE }
+        Self { gains: vec![[0.0; RAYS + 1]; SIDE + 1], slices: Self::NO_SLICES }
     }
 
     /// Adds what lies between two depths, in slices from the near plane.
     #[inline(always)]
     fn add(&mut self, cell: usize, from: f64, to: f64) {
-        self.slices.start = self.slices.start.min((from as usize).saturating_sub(1));
-        self.slices.end = self.slices.end.max(to as usize + 1);
+        let [first, end] = self.slices;
+        self.slices = [first.min((from as usize).saturating_sub(1)), end.max(to as usize + 1)];
         for (depth, sign) in [(to, 1.0), (from, -1.0)] {
             // All slices before this depth, and in part the one that it lies in.
             let slice = depth as usize;
@@ -237,7 +239,8 @@ impl Shares {
     #[inline(always)]
     fn write<const N: usize>(&mut self, full: f64, out: &mut [u8]) {
         let mut inside = [[0.0; N]; N];
-        for slice in std::mem::replace(&mut self.slices, Self::NONE).rev() {
+        let [first, end] = std::mem::replace(&mut self.slices, Self::NO_SLICES);
+        for slice in (first..end).rev() {
             let gains = &mut self.gains[slice];
             let mut bytes = [[0; N]; N];
             for row in 0..N {

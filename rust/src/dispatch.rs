@@ -1,11 +1,9 @@
-//! Instruction sets, chosen when the program runs: one wheel is fast on every processor.
+//! One wheel for every processor: hot functions are compiled once for each instruction set, and the best that the
+//! processor has is chosen when they are called.
 
-/// Compiles a function for AVX-512, for AVX2 and for the baseline, and calls the best one that the processor has.
-///
-/// Nothing is written in intrinsics: kernels are plain loops over arrays, which the compiler vectorises. What a
-/// dispatched function calls has to be `#[inline(always)]`, or it is compiled for the baseline alone. Multiplications
-/// and additions are never fused, so that results are the same bits on every processor.
-macro_rules! dispatched {
+/// Compiles a function for AVX-512, for AVX2 and for the plain architecture. What it calls must be `#[inline(always)]`,
+/// or it is compiled for the plain architecture alone.
+macro_rules! for_each_instruction_set {
     ($($function:tt)*) => {
         #[multiversion::multiversion(targets(
             "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl+avx2+fma+bmi1+bmi2+lzcnt+popcnt",
@@ -15,4 +13,4 @@ macro_rules! dispatched {
     };
 }
 
-pub(crate) use dispatched;
+pub(crate) use for_each_instruction_set;

@@ -8,7 +8,7 @@
 use crate::buffers::{Buffers, Pixels, image_points};
 use crate::camera::{Camera, IMAGE};
 use crate::csg::Shape;
-use crate::dispatch::dispatched;
+use crate::dispatch::for_each_instruction_set;
 use crate::error::CoreError;
 use crate::raycast::{RAYS, RayCaster, TILE, Tile};
 use serde::{Deserialize, Serialize};
@@ -55,13 +55,13 @@ pub fn detect(buffers: &Buffers, config: &LineConfig, ink: &mut [u8]) {
     draw_buffers(buffers, config, ink);
 }
 
-dispatched! {
+for_each_instruction_set! {
     fn draw_seen(caster: &RayCaster, config: &LineConfig, ink: &mut [u8]) {
         draw_tiles(caster, config, ink);
     }
 }
 
-dispatched! {
+for_each_instruction_set! {
     fn draw_buffers(buffers: &Buffers, config: &LineConfig, ink: &mut [u8]) {
         draw_rows(buffers, config, ink);
     }

@@ -1,7 +1,7 @@
 //! The world grid: 64^3 voxels over the cube [-1/2, 1/2]^3, one bit each.
 
 use crate::csg::{Kind, Primitive, Shape, cross_axes};
-use crate::dispatch::dispatched;
+use crate::dispatch::for_each_instruction_set;
 
 /// Voxels along each side of a grid.
 pub const SIDE: usize = 64;
@@ -110,13 +110,13 @@ fn spread(mut seed: u64, within: u64) -> u64 {
     }
 }
 
-dispatched! {
+for_each_instruction_set! {
     fn write_shape(words: &mut [u64], primitives: &[Primitive]) {
         write_primitives(words, primitives);
     }
 }
 
-dispatched! {
+for_each_instruction_set! {
     fn count_ones(words: &[u64]) -> u32 {
         words.iter().map(|w| w.count_ones()).sum()
     }
@@ -214,7 +214,7 @@ fn spread_bits(word: u64) -> [u8; SIDE] {
     if word != 0 {
         for (k, eight) in bytes.as_chunks_mut().0.iter_mut().enumerate() {
             // Eight bits, repeated in eight bytes, of which each keeps its own; that is then carried to the top.
-            let bits = (word >> (8 * k) & 0xff) * 0x0101_0101_0101_0101 & 0x8040_2010_0804_0201;
+            let bits = ((word >> (8 * k) & 0xff) * 0x0101_0101_0101_0101) & 0x8040_2010_0804_0201;
             *eight = ((bits + 0x7f7f_7f7f_7f7f_7f7f) >> 7 & 0x0101_0101_0101_0101).to_le_bytes();
         }
     }
