@@ -341,6 +341,26 @@ mod tests {
     }
 
     #[test]
+    fn a_shape_has_any_number_of_primitives() {
+        // Shells around each other: every other cuboid is taken away again.
+        let half = |i: usize| 0.5 - i as f64 / 256.0;
+        let shell = |i: usize| Primitive {
+            kind: Kind::Cuboid,
+            additive: i % 2 == 0,
+            center: DVec3::ZERO,
+            half: DVec3::splat(half(i)),
+        };
+        let shape = Shape::new((0..100).map(shell).collect()).unwrap();
+        let spans = spans(&shape, &Camera::orbit(0.0, 0.0, 0.0, 2.0), 0.0, 0.0);
+        assert_eq!(spans.len(), 100);
+        for (i, (front, back)) in (0..50).map(|i| (2 * i, (spans[i], spans[99 - i]))) {
+            let ends = [front.0 - 2.0, front.1 - 2.0, 2.0 - back.1, 2.0 - back.0];
+            let expected = [-half(i), -half(i + 1), -half(i), -half(i + 1)];
+            assert!(ends.iter().zip(expected).all(|(end, half)| (end - half).abs() < 1e-12), "{i}: {ends:?}");
+        }
+    }
+
+    #[test]
     fn a_slanted_face_has_its_depth_and_its_normal() {
         // Seen from the front, the ray along -x meets x / 0.2 + y / 0.1 = 0, the face of a ramp, at the origin; one
         // through height y at depth 1 where 2 - depth = -2 y depth.
