@@ -204,6 +204,9 @@ fn cells_of_rays(rays: usize, first_row: usize, first_col: usize) -> [usize; RAY
     })
 }
 
+/// Halves of a step are rounded up, as exact ones that the sums have left a little less: half of a cell is 128.
+const HALF: f64 = 0.5 + 1e-9;
+
 /// How much of each cell of a square is inside, slice by slice.
 struct Shares {
     /// For each slice and cell, how much more of it is inside than of the slice behind it. One cell is nobody's.
@@ -246,7 +249,7 @@ impl Shares {
             for row in 0..N {
                 for col in 0..N {
                     inside[row][col] += std::mem::take(&mut gains[row * N + col]);
-                    bytes[row][col] = (inside[row][col] * full + 0.5) as i32 as u8;
+                    bytes[row][col] = (inside[row][col] * full + HALF) as i32 as u8;
                 }
             }
             if slice < SIDE {
