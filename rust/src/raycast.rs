@@ -346,7 +346,7 @@ mod tests {
         let half = |i: usize| 0.5 - i as f64 / 256.0;
         let shell = |i: usize| Primitive {
             kind: Kind::Cuboid,
-            additive: i % 2 == 0,
+            additive: i.is_multiple_of(2),
             center: DVec3::ZERO,
             half: DVec3::splat(half(i)),
         };
