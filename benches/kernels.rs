@@ -76,7 +76,7 @@ fn shapes(group: &mut Group, shape: &Shape, camera: &Camera) {
     group.bench_function("lines", |b| b.iter(|| detect(black_box(&seen), &LineConfig::default())));
     let mut drawing = vec![0; IMAGE * IMAGE];
     let config = LineConfig::default();
-    group.bench_function("draw", |b| b.iter(|| _core::batch::draw(shape, camera, &config, &mut drawing)));
+    group.bench_function("draw", |b| b.iter(|| _core::lines::draw(shape, camera, &config, &mut drawing)));
     let rays = SampleConfig::default().frustum_rays;
     group.bench_function("frustum", |b| b.iter(|| fill_frustum(shape, camera, rays, &mut bytes)));
 }
@@ -94,7 +94,7 @@ fn volumes(group: &mut Group, shape: &Shape, camera: &Camera) {
 fn drawings(group: &mut Group, shape: &Shape, cameras: &[Camera]) {
     let (mut drawings, mut fields) = (vec![0; 6 * IMAGE * IMAGE], vec![0; 6 * FIELDS]);
     for (drawing, camera) in drawings.chunks_exact_mut(IMAGE * IMAGE).zip(cameras) {
-        _core::batch::draw(shape, camera, &LineConfig::default(), drawing).unwrap();
+        _core::lines::draw(shape, camera, &LineConfig::default(), drawing).unwrap();
     }
     let first = &drawings[..IMAGE * IMAGE];
     group.bench_function("silhouette", |b| b.iter(|| silhouette(black_box(first))));

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -142,16 +143,18 @@ class Shape:
                 raise TypeError(f"a Shape is made of Cuboid, Cylinder and Wedge, got {type(item).__name__}")
         object.__setattr__(self, "primitives", items)
 
-    @property
+    @cached_property
     def packed(self) -> NDArray[np.float64]:
         """float64 [n, 8], the form the Rust core takes: kind, op, center, half.
 
         Kind is 0 for a cuboid, 1, 2 or 3 for a cylinder along x, y or z, and 4, 8 or 12 for a wedge along them, with 1
         more for a corner at the positive end of the first axis across, and 2 more for one of the second. Op is 1 to
-        add, 0 to subtract.
+        add, 0 to subtract. Made once, and read-only.
         """
         rows = [(_kind(item), float(item.op == "add"), *item.center, *item.half) for item in self.primitives]
-        return np.array(rows, dtype=np.float64)
+        packed = np.array(rows, dtype=np.float64)
+        packed.flags.writeable = False
+        return packed
 
     @classmethod
     def from_packed(cls, packed: NDArray[np.float64]) -> Shape:

@@ -1,11 +1,11 @@
 //! Whole samples: shape, cameras, drawings, world grid and camera grids, as a function of (config, seed, index).
 
-use crate::buffers::{Buffers, fill_frustum};
+use crate::buffers::fill_frustum;
 use crate::camera::{Camera, DISTANCE, FAR, FOV_DEGREES, IMAGE, NEAR, QUARTER_VIEWS, VIEWPOINTS};
 use crate::csg::Shape;
 use crate::error::CoreError;
 use crate::grammar::GrammarConfig;
-use crate::lines::{LineConfig, detect};
+use crate::lines::{LineConfig, draw};
 use crate::pen::{PenConfig, redraw};
 use crate::random::Random;
 use crate::voxel::CELLS;
@@ -165,10 +165,11 @@ pub fn sample(
         let mut random = Random::new(seed, index, PEN + v as u64);
         if random.chance(config.hand.share) {
             let hand = hand_camera(&config.hand, stand, camera, &shape, &mut random);
-            let ink = ink(&shape, &hand, &config.lines)?;
+            draw(&shape, &hand, &config.lines, drawing)?;
+            let ink = drawing.iter().map(|&ink| ink > 0).collect();
             drawing.copy_from_slice(&redraw(ink, &config.hand.pen, &mut random));
         } else {
-            write_drawing(&ink(&shape, camera, &config.lines)?, drawing);
+            draw(&shape, camera, &config.lines, drawing)?;
         }
         fill_frustum(&shape, camera, config.frustum_rays, frustum)?;
     }
@@ -214,20 +215,6 @@ pub fn batch(
             Ok(made)
         })
         .collect()
-}
-
-/// The exact drawing of a shape, 255 for ink.
-pub fn draw(shape: &Shape, camera: &Camera, config: &LineConfig, out: &mut [u8]) -> Result<(), CoreError> {
-    write_drawing(&ink(shape, camera, config)?, out);
-    Ok(())
-}
-
-fn ink(shape: &Shape, camera: &Camera, config: &LineConfig) -> Result<Vec<bool>, CoreError> {
-    Ok(detect(&Buffers::of_shape(shape, camera, IMAGE)?, config))
-}
-
-fn write_drawing(ink: &[bool], out: &mut [u8]) {
-    out.iter_mut().zip(ink).for_each(|(o, &i)| *o = if i { 255 } else { 0 });
 }
 
 /// Where a camera stands before it is displaced, in degrees.

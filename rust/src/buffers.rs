@@ -1,9 +1,12 @@
 //! Depth and normal buffers, and the fractional camera grid: both by casting rays at the shape itself.
 
+#![expect(clippy::needless_range_loop, reason = "loops over the rays of a tile index many arrays at once")]
+
 use crate::camera::Camera;
 use crate::csg::Shape;
+use crate::dispatch::for_each_instruction_set;
 use crate::error::CoreError;
-use crate::raycast::RayCaster;
+use crate::raycast::{RAYS, RayCaster, TILE, Tile};
 use crate::voxel::{CELLS, SIDE};
 
 /// What a camera sees of a shape, pixel by pixel, row by row.
@@ -16,110 +19,255 @@ pub struct Buffers {
     pub size: usize,
 }
 
-/// Pixels along each side of the tiles that share a list of primitives.
-const TILE: usize = 8;
-
 impl Buffers {
     /// Casts one ray through the middle of each pixel.
     pub fn of_shape(shape: &Shape, camera: &Camera, size: usize) -> Result<Self, CoreError> {
-        refuse_eye_inside(shape, camera)?;
-        let caster = RayCaster::new(shape, camera);
-        let mut depth = vec![f32::INFINITY; size * size];
-        let mut normal = vec![[0.0; 3]; size * size];
-        let (mut candidates, mut spans) = (Vec::new(), Vec::new());
-        let at = |i: usize| (2 * i + 1) as f64 / size as f64 - 1.0;
-        for top in (0..size).step_by(TILE) {
-            let bottom = (top + TILE).min(size);
-            for left in (0..size).step_by(TILE) {
-                let right = (left + TILE).min(size);
-                caster.visible((at(left), at(right - 1)), (at(top), at(bottom - 1)), &mut candidates);
-                if candidates.is_empty() {
-                    continue;
-                }
-                for row in top..bottom {
-                    for col in left..right {
-                        let direction = camera.ray(at(col), at(row));
-                        caster.spans(direction, &candidates, &mut spans);
-                        if let Some(hit) = spans.first() {
-                            let n = caster.normal(hit.entry, direction, hit.start);
-                            depth[row * size + col] = hit.start as f32;
-                            normal[row * size + col] = n.as_vec3().to_array();
-                        }
-                    }
+        let caster = RayCaster::new(shape, camera)?;
+        let depth = vec![f32::INFINITY; size * size];
+        let normal = vec![[0.0; 3]; size * size];
+        let mut buffers = Self { depth, normal, size };
+        cast_image(&caster, &mut buffers);
+        Ok(buffers)
+    }
+}
+
+for_each_instruction_set! {
+    fn cast_image(caster: &RayCaster, buffers: &mut Buffers) {
+        cast_tiles(caster, buffers);
+    }
+}
+
+#[inline(always)]
+fn cast_tiles(caster: &RayCaster, buffers: &mut Buffers) {
+    let size = buffers.size;
+    let mut tile = Tile::new(caster);
+    for top in (0..size).step_by(TILE) {
+        tile.choose(caster, &image_points(top, size));
+        for left in (0..size).step_by(TILE) {
+            let Some(Pixels { depth, normal }) = Pixels::seen(caster, &mut tile, &image_points(left, size))
+            else {
+                continue;
+            };
+            for (row, lanes) in (top..size).zip((0..RAYS).step_by(TILE)) {
+                for (col, lane) in (left..size).zip(lanes..lanes + TILE) {
+                    buffers.depth[row * size + col] = depth[lane];
+                    buffers.normal[row * size + col] = [normal[0][lane], normal[1][lane], normal[2][lane]];
                 }
             }
         }
-        Ok(Self { depth, normal, size })
     }
+}
+
+/// What is seen in one tile, row by row, as in `Buffers`.
+pub struct Pixels {
+    pub depth: [f32; RAYS],
+    pub normal: [[f32; RAYS]; 3],
+}
+
+impl Pixels {
+    /// What the chosen rows of a tile show at these columns; `None` if there is nothing.
+    #[inline(always)]
+    pub fn seen(caster: &RayCaster, tile: &mut Tile, columns: &[f64; TILE]) -> Option<Self> {
+        if !tile.cast(caster, columns) {
+            return None;
+        }
+        let hits = tile.entries(None);
+        let (depth, normal) = (hits.depth(), tile.normals(caster, &hits));
+        let mut pixels = Self { depth: [0.0; RAYS], normal: [[0.0; RAYS]; 3] };
+        for r in 0..RAYS {
+            pixels.depth[r] = depth[r] as f32;
+            for axis in 0..3 {
+                pixels.normal[axis][r] = normal[axis][r] as f32;
+            }
+        }
+        Some(pixels)
+    }
+}
+
+impl Buffers {
+    /// The tile whose first pixel is in this column and row, blank beyond the image; `None` if it shows nothing.
+    #[inline(always)]
+    pub fn tile(&self, left: usize, top: usize) -> Option<Pixels> {
+        let mut pixels = Pixels { depth: [f32::INFINITY; RAYS], normal: [[0.0; RAYS]; 3] };
+        let mut seen = false;
+        for row in 0..TILE.min(self.size - top) {
+            let from = (top + row) * self.size + left;
+            let to = from + TILE.min(self.size - left);
+            let (depth, normal) = (&self.depth[from..to], &self.normal[from..to]);
+            if depth.iter().fold(true, |blank, &d| blank & (d == f32::INFINITY)) {
+                continue;
+            }
+            seen = true;
+            for col in 0..depth.len() {
+                let lane = row * TILE + col;
+                pixels.depth[lane] = depth[col];
+                [pixels.normal[0][lane], pixels.normal[1][lane], pixels.normal[2][lane]] = normal[col];
+            }
+        }
+        seen.then_some(pixels)
+    }
+}
+
+/// The middles of `TILE` pixels from `first` on, of `size` along the side of the image, in [-1, 1] units.
+#[inline(always)]
+pub fn image_points(first: usize, size: usize) -> [f64; TILE] {
+    std::array::from_fn(|i| (2 * (first + i).min(size - 1) + 1) as f64 / size as f64 - 1.0)
 }
 
 /// The share of each camera-grid cell that is inside the shape, 255 for all of it, in the order (slice, row, col).
 ///
 /// Exact along depth; across the image by `rays` x `rays` rays a cell.
 pub fn fill_frustum(shape: &Shape, camera: &Camera, rays: usize, out: &mut [u8]) -> Result<(), CoreError> {
-    refuse_eye_inside(shape, camera)?;
     assert_eq!(out.len(), CELLS);
-    let caster = RayCaster::new(shape, camera);
+    let caster = RayCaster::new(shape, camera)?;
+    out.fill(0);
+    fill_cells(&caster, rays, out);
+    Ok(())
+}
+
+for_each_instruction_set! {
+    fn fill_cells(caster: &RayCaster, rays: usize, out: &mut [u8]) {
+        fill_tiles(caster, rays, out);
+    }
+}
+
+/// Goes through squares of cells, as many as one tile of rays holds; or one cell by several tiles.
+#[inline(always)]
+fn fill_tiles(caster: &RayCaster, rays: usize, out: &mut [u8]) {
+    let (size, side) = (SIDE * rays, cells_a_side(rays));
+    let camera = caster.camera();
     let per_slice = SIDE as f64 / (camera.far - camera.near);
     let full = 255.0 / (rays * rays) as f64;
-    let at = |i: usize| (2 * i + 1) as f64 / (SIDE * rays) as f64 - 1.0;
-    let (mut candidates, mut spans) = (Vec::new(), Vec::new());
-    out.fill(0);
-    for row in 0..SIDE {
-        let ys = (at(row * rays), at(row * rays + rays - 1));
-        for col in 0..SIDE {
-            let xs = (at(col * rays), at(col * rays + rays - 1));
-            caster.visible(xs, ys, &mut candidates);
-            if candidates.is_empty() {
-                continue;
-            }
-            let mut inside = [0.0f64; SIDE];
-            for y in 0..rays {
-                for x in 0..rays {
-                    let direction = camera.ray(at(col * rays + x), at(row * rays + y));
-                    caster.spans(direction, &candidates, &mut spans);
-                    for span in &spans {
-                        let from = (span.start - camera.near) * per_slice;
-                        let to = (span.end - camera.near) * per_slice;
-                        cover(&mut inside, from, to);
+    // The first ray of each tile, and the cell that each of its rays is in.
+    let steps = || (0..side * rays).step_by(TILE);
+    let parts: Vec<_> = steps()
+        .flat_map(|row| steps().map(move |col| (row, col)))
+        .map(|(row, col)| (row, col, cells_of_rays(rays, row, col)))
+        .collect();
+    let mut tile = Tile::new(caster);
+    let mut shares = Shares::new();
+    for top in (0..SIDE).step_by(side) {
+        for left in (0..SIDE).step_by(side) {
+            for (first_row, first_col, cells) in &parts {
+                tile.choose(caster, &image_points(top * rays + first_row, size));
+                if !tile.cast(caster, &image_points(left * rays + first_col, size)) {
+                    continue;
+                }
+                let mut entries = tile.entries(None);
+                loop {
+                    let exits = tile.exits(&entries.nearness);
+                    let (start, end) = (entries.depth(), exits.depth());
+                    let (mut from, mut to) = ([0.0; RAYS], [0.0; RAYS]);
+                    for r in 0..RAYS {
+                        from[r] = ((start[r] - camera.near) * per_slice).clamp(0.0, SIDE as f64);
+                        to[r] = ((end[r] - camera.near) * per_slice).clamp(0.0, SIDE as f64);
                     }
+                    for r in 0..RAYS {
+                        if from[r] < to[r] {
+                            shares.add(cells[r], from[r], to[r]);
+                        }
+                    }
+                    if !tile.goes_on(&exits.nearness) {
+                        break;
+                    }
+                    entries = tile.entries(Some(&exits.nearness));
                 }
             }
-            for (slice, share) in inside.iter().enumerate() {
-                out[(slice * SIDE + row) * SIDE + col] = (share * full).round() as u8;
+            let corner = &mut out[top * SIDE + left..];
+            match side {
+                8 => shares.write::<8>(full, corner),
+                4 => shares.write::<4>(full, corner),
+                2 => shares.write::<2>(full, corner),
+                _ => shares.write::<1>(full, corner),
             }
         }
     }
-    Ok(())
 }
 
-/// Adds to each slice the share of it that lies between two depths, in slices from the near plane.
-fn cover(inside: &mut [f64; SIDE], from: f64, to: f64) {
-    let (from, to) = (from.max(0.0), to.min(SIDE as f64));
-    if from >= to {
-        return;
+/// Cells along the side of the square that one tile of rays sees.
+#[inline(always)]
+fn cells_a_side(rays: usize) -> usize {
+    match rays {
+        1 => 8,
+        2 => 4,
+        3 | 4 => 2,
+        _ => 1,
     }
-    let (first, last) = (from as usize, (to as usize).min(SIDE - 1));
-    if first == last {
-        inside[first] += to - from;
-        return;
-    }
-    inside[first] += (first + 1) as f64 - from;
-    inside[first + 1..last].iter_mut().for_each(|s| *s += 1.0);
-    inside[last] += to - last as f64;
 }
 
-fn refuse_eye_inside(shape: &Shape, camera: &Camera) -> Result<(), CoreError> {
-    if shape.contains(camera.position) {
-        return Err(CoreError::EyeInside(camera.position.to_array()));
+/// The cell of each ray of a tile; the one after the last for rays that another tile casts as well.
+fn cells_of_rays(rays: usize, first_row: usize, first_col: usize) -> [usize; RAYS] {
+    let side = cells_a_side(rays);
+    std::array::from_fn(|r| {
+        let (row, col) = ((first_row + r / TILE) / rays, (first_col + r % TILE) / rays);
+        if row < side && col < side { row * side + col } else { RAYS }
+    })
+}
+
+/// Halves of a step are rounded up, as exact ones that the sums have left a little less: half of a cell is 128.
+const HALF: f64 = 0.5 + 1e-9;
+
+/// How much of each cell of a square is inside, slice by slice.
+struct Shares {
+    /// For each slice and cell, how much more of it is inside than of the slice behind it. One cell is nobody's.
+    gains: Vec<[f64; RAYS + 1]>,
+    /// The first slice with any gains, and the one after the last.
+    slices: [usize; 2],
+}
+
+impl Shares {
+    const NO_SLICES: [usize; 2] = [SIDE, 0];
+
+    fn new() -> Self {
+        Self { gains: vec![[0.0; RAYS + 1]; SIDE + 1], slices: Self::NO_SLICES }
     }
-    Ok(())
+
+    /// Adds what lies between two depths, in slices from the near plane.
+    #[inline(always)]
+    fn add(&mut self, cell: usize, from: f64, to: f64) {
+        let [first, end] = self.slices;
+        self.slices = [first.min((from as usize).saturating_sub(1)), end.max(to as usize + 1)];
+        for (depth, sign) in [(to, 1.0), (from, -1.0)] {
+            // All slices before this depth, and in part the one that it lies in.
+            let slice = depth as usize;
+            let part = depth - slice as f64;
+            self.gains[slice][cell] += sign * part;
+            if slice > 0 {
+                self.gains[slice - 1][cell] += sign * (1.0 - part);
+            }
+        }
+    }
+
+    /// Sums up the gains of `N` x `N` cells from the far end, and clears them. `out` begins at the first cell.
+    #[inline(always)]
+    fn write<const N: usize>(&mut self, full: f64, out: &mut [u8]) {
+        let mut inside = [[0.0; N]; N];
+        let [first, end] = std::mem::replace(&mut self.slices, Self::NO_SLICES);
+        for slice in (first..end).rev() {
+            let gains = &mut self.gains[slice];
+            let mut bytes = [[0; N]; N];
+            for row in 0..N {
+                for col in 0..N {
+                    inside[row][col] += std::mem::take(&mut gains[row * N + col]);
+                    bytes[row][col] = (inside[row][col] * full + HALF) as i32 as u8;
+                }
+            }
+            if slice < SIDE {
+                for (row, bytes) in bytes.iter().enumerate() {
+                    out[(slice * SIDE + row) * SIDE..][..N].copy_from_slice(bytes);
+                }
+            }
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::VIEWPOINTS;
     use crate::csg::{Kind, Primitive};
+    use crate::grammar::GrammarConfig;
+    use crate::random::Random;
     use glam::DVec3;
 
     fn one(kind: Kind, half: [f64; 3]) -> Shape {
@@ -161,6 +309,28 @@ mod tests {
                 })
                 .sum();
             assert!((volume / exact - 1.0).abs() < 0.004, "{volume} {exact}");
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_sees_the_same() {
+        let grammar = GrammarConfig { wedges: 0.2, ..GrammarConfig::default() };
+        for (i, (azimuth, elevation)) in (0..).zip(VIEWPOINTS) {
+            let (shape, _) = grammar.draw(&mut Random::new(5, i, 0)).unwrap();
+            let camera = Camera::orbit(azimuth, elevation, 0.0, 2.0);
+            let caster = RayCaster::new(&shape, &camera).unwrap();
+            let best = Buffers::of_shape(&shape, &camera, 100).unwrap();
+            let mut baseline =
+                Buffers { depth: vec![f32::INFINITY; 10_000], normal: vec![[0.0; 3]; 10_000], size: 100 };
+            cast_tiles(&caster, &mut baseline);
+            assert!(best.depth == baseline.depth && best.normal == baseline.normal);
+            let (mut best, mut baseline) = (vec![0; CELLS], vec![0; CELLS]);
+            for rays in 1..=9 {
+                fill_frustum(&shape, &camera, rays, &mut best).unwrap();
+                baseline.fill(0);
+                fill_tiles(&caster, rays, &mut baseline);
+                assert!(best == baseline);
+            }
         }
     }
 

@@ -14,6 +14,8 @@
 //! mesh                                                       the surface that leaves the package
 //! ```
 //!
+//! `raycast` asks `intersect` about each primitive; `dispatch` compiles the loops for several instruction sets.
+//!
 //! Only `python` knows about Python; everything else is plain Rust that `cargo test` runs.
 
 pub mod batch;
@@ -26,6 +28,7 @@ pub mod distance;
 pub mod error;
 pub mod evidence;
 pub mod grammar;
+mod intersect;
 pub mod isosurface;
 pub mod lift;
 pub mod lines;

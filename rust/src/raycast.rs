@@ -1,272 +1,257 @@
-//! Where a ray is inside a CSG shape: the exact intervals, with the faces they begin and end on.
+//! Where rays are inside a shape: each primitive is one interval of a ray, and the last one that holds a point decides.
+//! No tree, no sampling.
 //!
-//! Primitives are applied in order to a short list of intervals: an additive one is united with it, a
-//! subtractive one cut out of it. What remains is the shape along the ray; no tree, no sampling.
-//! Rays are parametrised by depth along the camera's z axis, so an interval's ends are depths.
+//! Rays go in tiles of 8 x 8, which share a list of primitives. Points of a ray are named by their nearness, see
+//! `intersect.rs`.
 
-use crate::camera::{Camera, IMAGE};
-use crate::csg::{Kind, Primitive, Shape, cross_axes};
-use glam::DVec3;
+#![expect(clippy::needless_range_loop, reason = "loops over the rays of a tile index many arrays at once")]
+
+use crate::camera::Camera;
+use crate::csg::Shape;
+use crate::error::CoreError;
+pub use crate::intersect::{Lanes, RAYS, TILE};
+use crate::intersect::{NEAREST, Placed, less};
 
 /// Gaps and slivers shorter than this (world units) are rounding, not geometry.
 const EPSILON: f64 = 1e-9;
 
-/// The face of a primitive: its index, and 0, 1, 2 for a flat face across x, y, z, 3 for the curved or
-/// slanted one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Face {
-    primitive: u32,
-    side: u8,
-}
-
-/// One stretch of a ray inside the shape, from depth `start` to depth `end`.
-#[derive(Clone, Copy, Debug)]
-pub struct Span {
-    pub start: f64,
-    pub end: f64,
-    pub entry: Face,
-    exit: Face,
-}
-
-/// A shape prepared for the rays of one camera: who may be seen where in the image.
+/// A shape prepared for the rays of one camera.
 pub struct RayCaster<'a> {
-    primitives: &'a [Primitive],
     camera: &'a Camera,
-    /// Image bounds of each primitive: x from, x to, y from, y to, in [-1, 1] units of the image.
-    bounds: Vec<[f64; 4]>,
+    primitives: Vec<Placed>,
 }
 
 impl<'a> RayCaster<'a> {
-    pub fn new(shape: &'a Shape, camera: &'a Camera) -> Self {
-        let primitives = shape.primitives();
-        let bounds = primitives.iter().map(|p| image_bounds(p, camera)).collect();
-        Self { primitives, camera, bounds }
+    /// Refuses an eye inside the shape.
+    pub fn new(shape: &Shape, camera: &'a Camera) -> Result<Self, CoreError> {
+        if shape.contains(camera.position) {
+            return Err(CoreError::EyeInside(camera.position.to_array()));
+        }
+        let primitives = shape.primitives().iter().map(|p| Placed::new(p, camera)).collect();
+        Ok(Self { camera, primitives })
     }
 
-    /// Indices of the primitives that rays through this part of the image may meet, into `out`.
-    pub fn visible(&self, x: (f64, f64), y: (f64, f64), out: &mut Vec<u32>) {
-        out.clear();
-        out.extend((0..self.primitives.len() as u32).filter(|&i| {
-            let b = &self.bounds[i as usize];
-            b[0] <= x.1 && x.0 <= b[1] && b[2] <= y.1 && y.0 <= b[3]
-        }));
+    pub fn camera(&self) -> &Camera {
+        self.camera
+    }
+}
+
+/// The rays of one tile, and where they are inside each of the primitives that they meet.
+pub struct Tile {
+    rows: [f64; TILE],
+    /// The primitives that may be seen in these rows.
+    candidates: Vec<usize>,
+    /// One unit of depth along each ray, in the world.
+    direction: [Lanes; 3],
+    crossings: Vec<Crossing>,
+    /// How many of the crossings are of this tile.
+    met: usize,
+}
+
+/// Where each ray is inside a primitive: from one nearness to a lesser one; from 0 to `NEAREST` for a ray that misses it.
+#[derive(Clone)]
+struct Crossing {
+    primitive: usize,
+    additive: bool,
+    start: Lanes,
+    end: Lanes,
+}
+
+/// The surface that each ray comes to next: how near it is, 0 for none, and whose it is by the number of the crossing.
+pub struct Hits {
+    pub nearness: Lanes,
+    crossing: [u64; RAYS],
+}
+
+impl Tile {
+    pub fn new(caster: &RayCaster) -> Self {
+        let none = Crossing { primitive: 0, additive: true, start: [0.0; RAYS], end: [0.0; RAYS] };
+        let crossings = vec![none; caster.primitives.len()];
+        Self { rows: [0.0; TILE], candidates: Vec::new(), direction: [[0.0; RAYS]; 3], crossings, met: 0 }
     }
 
-    /// The stretches of the ray along `direction` (from the eye, one unit of depth) inside the shape, in order
-    /// of depth, into `spans`. `candidates` comes from `visible`.
-    pub fn spans(&self, direction: DVec3, candidates: &[u32], spans: &mut Vec<Span>) {
-        spans.clear();
-        let inverse = direction.recip();
-        for &index in candidates {
-            let primitive = &self.primitives[index as usize];
-            if !primitive.additive && spans.is_empty() {
+    /// Chooses the rows of the image (ascending, [-1, 1] units) that the tiles to come are in.
+    #[inline(always)]
+    pub fn choose(&mut self, caster: &RayCaster, rows: &[f64; TILE]) {
+        self.rows = *rows;
+        self.candidates.clear();
+        for (index, placed) in caster.primitives.iter().enumerate() {
+            if (placed.bounds[2] <= rows[TILE - 1]) & (rows[0] <= placed.bounds[3]) {
+                self.candidates.push(index);
+            }
+        }
+    }
+
+    /// Casts rays through these columns of the chosen rows. Whether any meets anything.
+    #[inline(always)]
+    pub fn cast(&mut self, caster: &RayCaster, columns: &[f64; TILE]) -> bool {
+        self.met = 0;
+        let mut aimed = false;
+        for i in 0..self.candidates.len() {
+            let primitive = self.candidates[i];
+            let placed = &caster.primitives[primitive];
+            let additive = placed.primitive.additive;
+            let seen = (placed.bounds[0] <= columns[TILE - 1]) & (columns[0] <= placed.bounds[1]);
+            if !seen | ((self.met == 0) & !additive) {
                 continue;
             }
-            let origin = self.camera.position - primitive.center;
-            let Some((a, b, entry, exit)) = intersect(primitive, origin, direction, inverse) else {
-                continue;
-            };
-            let face = |side| Face { primitive: index, side };
-            let span = Span { start: a, end: b, entry: face(entry), exit: face(exit) };
-            if primitive.additive {
-                unite(spans, span);
-            } else {
-                cut(spans, &span);
+            if !aimed {
+                self.aim(caster.camera, columns);
+                aimed = true;
             }
+            let crossing = &mut self.crossings[self.met];
+            (crossing.primitive, crossing.additive) = (primitive, additive);
+            self.met += usize::from(placed.cross(&self.direction, &mut crossing.start, &mut crossing.end));
         }
-        spans.retain(|s| s.start > 0.0);
+        self.met > 0
     }
 
-    /// The unit normal of a face where the ray meets it, turned towards the eye.
-    pub fn normal(&self, face: Face, direction: DVec3, depth: f64) -> DVec3 {
-        let p = &self.primitives[face.primitive as usize];
-        let normal = match face.side {
-            0 => DVec3::X,
-            1 => DVec3::Y,
-            2 => DVec3::Z,
-            _ => round_or_slanted(p, self.camera.position + direction * depth - p.center),
-        };
-        if normal.dot(direction) > 0.0 { -normal } else { normal }
-    }
-}
-
-/// A normal of the face that is not flat across an axis, at a point of it relative to the primitive's centre.
-fn round_or_slanted(primitive: &Primitive, at: DVec3) -> DVec3 {
-    let half = primitive.half;
-    let mut normal = DVec3::ZERO;
-    match primitive.kind {
-        Kind::Cuboid => {}
-        Kind::Cylinder { axis } => {
-            let (u, v) = cross_axes(axis);
-            (normal[u], normal[v]) = (at[u] / (half[u] * half[u]), at[v] / (half[v] * half[v]));
-        }
-        Kind::Wedge { axis, corner } => {
-            let (u, v) = cross_axes(axis);
-            (normal[u], normal[v]) = (f64::from(corner[0]) / half[u], f64::from(corner[1]) / half[v]);
-        }
-    }
-    normal.normalize()
-}
-
-/// Entry and exit depth of a ray through one primitive, with the sides it enters and leaves by.
-// In line, and wedges apart: drawing cuboids and cylinders takes a tenth longer otherwise.
-#[inline(always)]
-fn intersect(
-    primitive: &Primitive,
-    origin: DVec3,
-    direction: DVec3,
-    inverse: DVec3,
-) -> Option<(f64, f64, u8, u8)> {
-    let (mut a, mut b, mut entry, mut exit) = (f64::NEG_INFINITY, f64::INFINITY, 0, 0);
-    let mut slab = |axis: usize| {
-        let half = primitive.half[axis];
-        if direction[axis] == 0.0 {
-            return origin[axis].abs() <= half;
-        }
-        let (s, t) = ((-half - origin[axis]) * inverse[axis], (half - origin[axis]) * inverse[axis]);
-        let (s, t) = if s <= t { (s, t) } else { (t, s) };
-        if s > a {
-            (a, entry) = (s, axis as u8);
-        }
-        if t < b {
-            (b, exit) = (t, axis as u8);
-        }
-        a < b
-    };
-    match primitive.kind {
-        Kind::Cuboid => {
-            if !(slab(0) && slab(1) && slab(2)) {
-                return None;
-            }
-        }
-        Kind::Wedge { .. } => return intersect_wedge(primitive, origin, direction, inverse),
-        Kind::Cylinder { axis } => {
-            if !slab(axis) {
-                return None;
-            }
-            let (u, v) = cross_axes(axis);
-            let (iu, iv) = (1.0 / primitive.half[u], 1.0 / primitive.half[v]);
-            let (ou, ov, du, dv) = (origin[u] * iu, origin[v] * iv, direction[u] * iu, direction[v] * iv);
-            let (qa, qb, qc) = (du * du + dv * dv, ou * du + ov * dv, ou * ou + ov * ov - 1.0);
-            if qa == 0.0 {
-                if qc > 0.0 {
-                    return None;
-                }
-            } else {
-                let discriminant = qb * qb - qa * qc;
-                if discriminant <= 0.0 {
-                    return None;
-                }
-                let root = discriminant.sqrt();
-                let (s, t) = ((-qb - root) / qa, (-qb + root) / qa);
-                if s > a {
-                    (a, entry) = (s, 3);
-                }
-                if t < b {
-                    (b, exit) = (t, 3);
-                }
-                if a >= b {
-                    return None;
+    #[inline(always)]
+    fn aim(&mut self, camera: &Camera, columns: &[f64; TILE]) {
+        let h = camera.half_image;
+        for (axis, direction) in self.direction.iter_mut().enumerate() {
+            let [right, down, forward] = camera.axes.map(|a| a[axis]);
+            for row in 0..TILE {
+                for col in 0..TILE {
+                    let (x, y) = (columns[col] * h, self.rows[row] * h);
+                    direction[row * TILE + col] = right * x + down * y + forward;
                 }
             }
         }
     }
-    (b > 0.0).then_some((a, b, entry, exit))
-}
 
-/// What `intersect` finds of a wedge: its box, clipped by its slanted face.
-#[inline(never)]
-fn intersect_wedge(
-    primitive: &Primitive,
-    origin: DVec3,
-    direction: DVec3,
-    inverse: DVec3,
-) -> Option<(f64, f64, u8, u8)> {
-    let Kind::Wedge { axis, corner } = primitive.kind else { return None };
-    let cuboid = Primitive { kind: Kind::Cuboid, ..*primitive };
-    let (mut a, mut b, mut entry, mut exit) = intersect(&cuboid, origin, direction, inverse)?;
-    let (u, v) = cross_axes(axis);
-    let (nu, nv) = (f64::from(corner[0]) / primitive.half[u], f64::from(corner[1]) / primitive.half[v]);
-    // How far inside the slanted face, at the eye and for each unit of depth.
-    let (within, slope) = (nu * origin[u] + nv * origin[v], nu * direction[u] + nv * direction[v]);
-    let t = -within / slope;
-    if slope > 0.0 && t > a {
-        (a, entry) = (t, 3);
+    /// Where each ray enters the shape, in front of the eye; not before `from`, a point outside.
+    ///
+    /// That is where it enters an additive primitive, moved on to the end of every later subtractive one that holds
+    /// the point.
+    #[inline(always)]
+    pub fn entries(&self, from: Option<&Lanes>) -> Hits {
+        let crossings = &self.crossings[..self.met];
+        let mut hits = Hits { nearness: [0.0; RAYS], crossing: [0; RAYS] };
+        for number in (0..crossings.len()).filter(|&i| crossings[i].additive) {
+            hits.offer(crossings, number, from);
+        }
+        hits
     }
-    if slope < 0.0 && t < b {
-        (b, exit) = (t, 3);
-    }
-    let missed = a >= b || b <= 0.0 || (slope == 0.0 && within < 0.0);
-    (!missed).then_some((a, b, entry, exit))
-}
 
-/// Adds a stretch, joining it with those it touches.
-fn unite(spans: &mut Vec<Span>, mut new: Span) {
-    let first = spans.partition_point(|s| s.end < new.start - EPSILON);
-    let mut last = first;
-    while last < spans.len() && spans[last].start <= new.end + EPSILON {
-        let old = spans[last];
-        if old.start < new.start - EPSILON {
-            (new.start, new.entry) = (old.start, old.entry);
+    /// Where each ray leaves the shape after `from`, a point inside.
+    #[inline(always)]
+    pub fn exits(&self, from: &Lanes) -> Hits {
+        let crossings = &self.crossings[..self.met];
+        // It enters nothing, of which all additive primitives are taken away; or a subtractive one.
+        let mut hits = Hits { nearness: *from, crossing: [0; RAYS] };
+        hits.push(crossings, 0, true);
+        for number in (0..crossings.len()).filter(|&i| !crossings[i].additive) {
+            hits.offer(crossings, number, Some(from));
         }
-        if old.end > new.end + EPSILON {
-            (new.end, new.exit) = (old.end, old.exit);
-        }
-        last += 1;
+        hits
     }
-    if first == last {
-        spans.insert(first, new);
-    } else {
-        spans[first] = new;
-        spans.drain(first + 1..last);
-    }
-}
 
-/// Takes a stretch away.
-fn cut(spans: &mut Vec<Span>, hole: &Span) {
-    let mut i = 0;
-    while i < spans.len() {
-        let old = spans[i];
-        if old.end <= hole.start + EPSILON || old.start >= hole.end - EPSILON {
-            i += 1;
-            continue;
+    /// Whether any ray may enter the shape again, having left it at `from`.
+    #[inline(always)]
+    pub fn goes_on(&self, from: &Lanes) -> bool {
+        let mut any = 0;
+        for crossing in self.crossings[..self.met].iter().filter(|c| c.additive) {
+            for r in 0..RAYS {
+                any |= u64::from(crossing.end[r] < from[r]);
+            }
         }
-        let before =
-            (hole.start - old.start > EPSILON).then_some(Span { end: hole.start, exit: hole.entry, ..old });
-        let after =
-            (old.end - hole.end > EPSILON).then_some(Span { start: hole.end, entry: hole.exit, ..old });
-        let left = usize::from(before.is_some()) + usize::from(after.is_some());
-        spans.splice(i..=i, before.into_iter().chain(after));
-        i += left;
+        any != 0
+    }
+
+    /// The unit normals in the world where rays meet the shape, turned towards the eye; 0 where they do not.
+    #[inline(always)]
+    pub fn normals(&self, caster: &RayCaster, hits: &Hits) -> [Lanes; 3] {
+        let mut normals = [[0.0; RAYS]; 3];
+        for (number, crossing) in self.crossings[..self.met].iter().enumerate() {
+            // How near the hits on this primitive are; 0 at other rays.
+            let mut own = [0.0; RAYS];
+            let mut any = 0;
+            for r in 0..RAYS {
+                own[r] = if hits.crossing[r] == number as u64 { hits.nearness[r] } else { 0.0 };
+                any |= own[r].to_bits();
+            }
+            if any != 0 {
+                caster.primitives[crossing.primitive].normals(&self.direction, own, &mut normals);
+            }
+        }
+        normals
     }
 }
 
-/// A rectangle of the image, in [-1, 1] units, that holds the primitive; all of it when part lies behind the eye.
-fn image_bounds(primitive: &Primitive, camera: &Camera) -> [f64; 4] {
-    let margin = 1e-6 / IMAGE as f64;
-    let mut bounds = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
-    for corner in 0..8 {
-        let sign = DVec3::new(
-            f64::from(corner & 1) * 2.0 - 1.0,
-            f64::from(corner >> 1 & 1) * 2.0 - 1.0,
-            f64::from(corner >> 2) * 2.0 - 1.0,
-        );
-        let p = camera.to_camera(primitive.center + primitive.half * sign);
-        if p.z <= 1e-3 {
-            return [f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY];
+impl Hits {
+    /// How deep the surfaces are; infinite for none.
+    #[inline(always)]
+    pub fn depth(&self) -> Lanes {
+        let mut depth = [0.0; RAYS];
+        for r in 0..RAYS {
+            depth[r] = 1.0 / self.nearness[r];
         }
-        let (x, y) = (p.x / (p.z * camera.half_image), p.y / (p.z * camera.half_image));
-        bounds[0] = bounds[0].min(x - margin);
-        bounds[1] = bounds[1].max(x + margin);
-        bounds[2] = bounds[2].min(y - margin);
-        bounds[3] = bounds[3].max(y + margin);
+        depth
     }
-    bounds
+
+    /// Takes the first point in one primitive, not before `from`, but in no later one of the other sign, where that
+    /// point is nearer.
+    #[inline(always)]
+    fn offer(&mut self, crossings: &[Crossing], number: usize, from: Option<&Lanes>) {
+        let Crossing { start, end, additive, .. } = &crossings[number];
+        let cut = crossings[number..].iter().any(|c| c.additive != *additive);
+        if !cut && from.is_none() {
+            for r in 0..RAYS {
+                let nearer = (start[r] > self.nearness[r]) & (start[r] < NEAREST);
+                self.nearness[r] = if nearer { start[r] } else { self.nearness[r] };
+                self.crossing[r] = if nearer { number as u64 } else { self.crossing[r] };
+            }
+            return;
+        }
+        let from = from.unwrap_or(&[NEAREST; RAYS]);
+        let mut first = Hits { nearness: *start, crossing: [number as u64; RAYS] };
+        for r in 0..RAYS {
+            first.nearness[r] = less(start[r], from[r]);
+        }
+        if cut {
+            first.push(crossings, number + 1, !additive);
+        }
+        for r in 0..RAYS {
+            let at = first.nearness[r];
+            let begins = (at == start[r]) & (at < from[r]);
+            let there = begins | (at - end[r] > EPSILON * at * at);
+            let nearer = there & (at > self.nearness[r]) & (at < NEAREST);
+            self.nearness[r] = if nearer { at } else { self.nearness[r] };
+            self.crossing[r] = if nearer { first.crossing[r] } else { self.crossing[r] };
+        }
+    }
+
+    /// Moves points on until they lie in none of the crossings of one sign from number `first` on.
+    #[inline(always)]
+    fn push(&mut self, crossings: &[Crossing], first: usize, additive: bool) {
+        let others = crossings.iter().skip(first).filter(|c| c.additive == additive).count();
+        let mut moved = others > 0;
+        while moved {
+            moved = false;
+            for (number, c) in
+                crossings.iter().enumerate().skip(first).filter(|(_, c)| c.additive == additive)
+            {
+                let mut any = 0;
+                for r in 0..RAYS {
+                    let at = self.nearness[r];
+                    let slack = EPSILON * at * at;
+                    let within = (c.start[r] >= at - slack) & (at - slack > c.end[r]);
+                    self.nearness[r] = if within { c.end[r] } else { at };
+                    self.crossing[r] = if within { number as u64 } else { self.crossing[r] };
+                    any |= u64::from(within);
+                }
+                moved |= (any != 0) & (others > 1);
+            }
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::csg::{Kind, Primitive};
+    use glam::DVec3;
     use proptest::prelude::*;
 
     fn any_shape() -> impl Strategy<Value = Shape> {
@@ -282,25 +267,51 @@ mod tests {
         prop::collection::vec(primitive, 1..9).prop_map(|p| Shape::new(p).unwrap())
     }
 
+    /// The stretches of one ray inside the shape; the other rays of its tile go elsewhere.
+    fn spans(shape: &Shape, camera: &Camera, x: f64, y: f64) -> Vec<(f64, f64)> {
+        let (_, tile) = cast(shape, camera, x, y);
+        let (mut from, mut spans) = (None, Vec::new());
+        loop {
+            let entries = tile.entries(from.as_ref());
+            let exits = tile.exits(&entries.nearness);
+            if entries.nearness[0] == 0.0 {
+                return spans;
+            }
+            spans.push((entries.depth()[0], exits.depth()[0]));
+            from = Some(exits.nearness);
+        }
+    }
+
+    fn normal(shape: &Shape, camera: &Camera, x: f64, y: f64) -> DVec3 {
+        let (caster, tile) = cast(shape, camera, x, y);
+        DVec3::from(tile.normals(&caster, &tile.entries(None)).map(|n| n[0]))
+    }
+
+    fn cast<'a>(shape: &Shape, camera: &'a Camera, x: f64, y: f64) -> (RayCaster<'a>, Tile) {
+        let caster = RayCaster::new(shape, camera).unwrap();
+        let mut tile = Tile::new(&caster);
+        let from = |at: f64| std::array::from_fn(|i| at + 0.03 * i as f64);
+        tile.choose(&caster, &from(y));
+        tile.cast(&caster, &from(x));
+        (caster, tile)
+    }
+
     proptest! {
         #[test]
         fn spans_agree_with_points_along_the_ray(
             shape in any_shape(), x in -0.9..0.9, y in -0.9..0.9, azimuth in 0.0..360.0, elevation in -80.0..80.0
         ) {
             let camera = Camera::orbit(azimuth, elevation, 0.0, 2.0);
-            let caster = RayCaster::new(&shape, &camera);
             let direction = camera.ray(x, y);
-            let (mut candidates, mut spans) = (Vec::new(), Vec::new());
-            caster.visible((x, x), (y, y), &mut candidates);
-            caster.spans(direction, &candidates, &mut spans);
+            let spans = spans(&shape, &camera, x, y);
             for pair in spans.windows(2) {
-                prop_assert!(pair[0].end < pair[1].start);
+                prop_assert!(pair[0].1 < pair[1].0);
             }
             for k in 0..400 {
                 let depth = 1.25 + 1.5 * (f64::from(k) + 0.37) / 400.0;
-                let near_an_end = spans.iter().any(|s| (s.start - depth).abs().min((s.end - depth).abs()) < 1e-7);
+                let near_an_end = spans.iter().any(|s| (s.0 - depth).abs().min((s.1 - depth).abs()) < 1e-7);
                 if !near_an_end {
-                    let within = spans.iter().any(|s| s.start < depth && depth < s.end);
+                    let within = spans.iter().any(|s| s.0 < depth && depth < s.1);
                     prop_assert_eq!(within, shape.contains(camera.position + direction * depth));
                 }
             }
@@ -322,13 +333,31 @@ mod tests {
         ])
         .unwrap();
         let camera = Camera::orbit(0.0, 0.0, 0.0, 2.0);
-        let caster = RayCaster::new(&shape, &camera);
-        let mut spans = Vec::new();
-        caster.spans(camera.ray(0.0, 0.0), &[0, 1, 2], &mut spans);
+        let spans = spans(&shape, &camera, 0.0, 0.0);
         assert_eq!(spans.len(), 1);
-        assert!((spans[0].start - 1.9).abs() < 1e-12 && (spans[0].end - 2.2).abs() < 1e-12);
-        let normal = caster.normal(spans[0].entry, camera.ray(0.0, 0.0), spans[0].start);
+        assert!((spans[0].0 - 1.9).abs() < 1e-12 && (spans[0].1 - 2.2).abs() < 1e-12);
+        let normal = normal(&shape, &camera, 0.0, 0.0);
         assert!((normal - DVec3::X).length() < 1e-12, "{normal}");
+    }
+
+    #[test]
+    fn a_shape_has_any_number_of_primitives() {
+        // Shells around each other: every other cuboid is taken away again.
+        let half = |i: usize| 0.5 - i as f64 / 256.0;
+        let shell = |i: usize| Primitive {
+            kind: Kind::Cuboid,
+            additive: i.is_multiple_of(2),
+            center: DVec3::ZERO,
+            half: DVec3::splat(half(i)),
+        };
+        let shape = Shape::new((0..100).map(shell).collect()).unwrap();
+        let spans = spans(&shape, &Camera::orbit(0.0, 0.0, 0.0, 2.0), 0.0, 0.0);
+        assert_eq!(spans.len(), 100);
+        for (i, (front, back)) in (0..50).map(|i| (2 * i, (spans[i], spans[99 - i]))) {
+            let ends = [front.0 - 2.0, front.1 - 2.0, 2.0 - back.1, 2.0 - back.0];
+            let expected = [-half(i), -half(i + 1), -half(i), -half(i + 1)];
+            assert!(ends.iter().zip(expected).all(|(end, half)| (end - half).abs() < 1e-12), "{i}: {ends:?}");
+        }
     }
 
     #[test]
@@ -340,15 +369,12 @@ mod tests {
         let half = DVec3::new(0.2, 0.1, 0.3);
         let primitive = Primitive { kind, additive: true, center: DVec3::ZERO, half };
         let shape = Shape::new(vec![primitive]).unwrap();
-        let caster = RayCaster::new(&shape, &camera);
-        let mut spans = Vec::new();
         for image_y in [-0.1, 0.0, 0.1] {
-            let direction = camera.ray(0.0, image_y);
-            caster.spans(direction, &[0], &mut spans);
-            let expected = 2.0 / (1.0 - 2.0 * direction.y);
+            let spans = spans(&shape, &camera, 0.0, image_y);
+            let expected = 2.0 / (1.0 - 2.0 * camera.ray(0.0, image_y).y);
             assert_eq!(spans.len(), 1);
-            assert!((spans[0].start - expected).abs() < 1e-12, "{} {expected}", spans[0].start);
-            let normal = caster.normal(spans[0].entry, direction, spans[0].start);
+            assert!((spans[0].0 - expected).abs() < 1e-12, "{} {expected}", spans[0].0);
+            let normal = normal(&shape, &camera, 0.0, image_y);
             let across = DVec3::new(1.0, 2.0, 0.0).normalize();
             assert!((normal - across).length() < 1e-12, "{normal}");
         }

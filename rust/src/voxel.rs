@@ -1,6 +1,7 @@
 //! The world grid: 64^3 voxels over the cube [-1/2, 1/2]^3, one bit each.
 
-use crate::csg::{Kind, Shape, cross_axes};
+use crate::csg::{Kind, Primitive, Shape, cross_axes};
+use crate::dispatch::for_each_instruction_set;
 
 /// Voxels along each side of a grid.
 pub const SIDE: usize = 64;
@@ -8,9 +9,20 @@ pub const SIDE: usize = 64;
 pub const CELLS: usize = SIDE * SIDE * SIDE;
 
 /// The world coordinate of a voxel's centre along one axis.
-pub fn voxel_center(index: usize) -> f64 {
+pub const fn voxel_center(index: usize) -> f64 {
     (index as f64 + 0.5) / SIDE as f64 - 0.5
 }
+
+/// The world coordinates of all voxels' centres along one axis.
+const CENTERS: [f64; SIDE] = {
+    let mut centers = [0.0; SIDE];
+    let mut i = 0;
+    while i < SIDE {
+        centers[i] = voxel_center(i);
+        i += 1;
+    }
+    centers
+};
 
 /// A binary grid: word `x * 64 + y` holds a column along z, bit z of it the voxel (x, y, z).
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -28,88 +40,34 @@ impl BitGrid {
     /// The voxels whose centre lies inside the shape.
     pub fn of_shape(shape: &Shape) -> Self {
         let mut grid = Self::default();
-        for p in shape.primitives() {
-            // Offsets from the primitive's centre in half sizes, along each axis.
-            let parts: [[f64; SIDE]; 3] =
-                std::array::from_fn(|a| std::array::from_fn(|i| (voxel_center(i) - p.center[a]) / p.half[a]));
-            let within: [[bool; SIDE]; 3] = std::array::from_fn(|a| {
-                std::array::from_fn(|i| (voxel_center(i) - p.center[a]).abs() <= p.half[a])
-            });
-            match p.kind {
-                Kind::Cuboid => {
-                    let z_mask = mask(|z| within[2][z]);
-                    grid.write(p.additive, &within, |_, _| z_mask);
-                }
-                Kind::Cylinder { axis } => {
-                    grid.write_prism(p.additive, &within, &parts, axis, |a, b| a * a + b * b <= 1.0);
-                }
-                Kind::Wedge { axis, corner } => {
-                    let [u, v] = corner.map(f64::from);
-                    grid.write_prism(p.additive, &within, &parts, axis, |a, b| u * a + v * b >= 0.0);
-                }
-            }
-        }
+        write_shape(&mut grid.words, shape.primitives());
         grid
     }
 
-    /// Writes the same section all along an axis; `inside` is asked by offsets along the two cross axes.
-    fn write_prism(
-        &mut self,
-        additive: bool,
-        within: &[[bool; SIDE]; 3],
-        parts: &[[f64; SIDE]; 3],
-        axis: usize,
-        inside: impl Fn(f64, f64) -> bool,
-    ) {
-        let (u, v) = cross_axes(axis);
-        if axis == 2 {
-            let z_mask = mask(|z| within[2][z]);
-            self.write(additive, within, |x, y| if inside(parts[u][x], parts[v][y]) { z_mask } else { 0 });
-        } else {
-            let section: [u64; SIDE] =
-                std::array::from_fn(|i| mask(|z| within[2][z] && inside(parts[u][i], parts[v][z])));
-            self.write(additive, within, |x, y| section[[x, y][u]]);
-        }
-    }
-
-    fn write(&mut self, additive: bool, within: &[[bool; SIDE]; 3], column: impl Fn(usize, usize) -> u64) {
-        for x in (0..SIDE).filter(|&x| within[0][x]) {
-            for y in (0..SIDE).filter(|&y| within[1][y]) {
-                let word = &mut self.words[x * SIDE + y];
-                if additive {
-                    *word |= column(x, y);
-                } else {
-                    *word &= !column(x, y);
-                }
-            }
-        }
-    }
-
     pub fn count(&self) -> u32 {
-        self.words.iter().map(|w| w.count_ones()).sum()
+        count_ones(&self.words)
     }
 
     /// One byte a voxel, 0 or 1, in the order (x, y, z).
+    pub fn to_bytes(&self) -> Vec<u8> {
+        spread_words(&self.words).into_flattened()
+    }
+
+    /// What `to_bytes` makes, into `out`.
     pub fn write_bytes(&self, out: &mut [u8]) {
-        for (word, bytes) in self.words.iter().zip(out.chunks_exact_mut(SIDE)) {
-            for (z, byte) in bytes.iter_mut().enumerate() {
-                *byte = (word >> z & 1) as u8;
-            }
-        }
+        write_words(&self.words, out);
     }
 
     /// Inclusive index bounds of the occupied voxels along each axis; `None` when there are none.
     pub fn bounds(&self) -> Option<[(usize, usize); 3]> {
-        let mut all = 0;
-        let mut bounds = [(SIDE, 0); 3];
-        for (i, &word) in self.words.iter().enumerate().filter(|(_, w)| **w != 0) {
-            all |= word;
-            for (b, at) in bounds.iter_mut().zip([i / SIDE, i % SIDE]) {
-                *b = (b.0.min(at), b.1.max(at));
-            }
+        let (mut layers, mut rows) = (0, [0; SIDE]);
+        for (x, layer) in self.words.as_chunks::<SIDE>().0.iter().enumerate() {
+            layers |= u64::from(layer.iter().fold(0, |all, word| all | word) != 0) << x;
+            rows.iter_mut().zip(layer).for_each(|(row, word)| *row |= word);
         }
-        bounds[2] = (all.trailing_zeros() as usize, 63 - (all.leading_zeros() as usize).min(63));
-        (all != 0).then_some(bounds)
+        let columns = rows.iter().fold(0, |all, word| all | word);
+        let ends = |bits: u64| (bits.trailing_zeros() as usize, 63 - bits.leading_zeros() as usize);
+        (layers != 0).then(|| [ends(layers), ends(mask(|y| rows[y] != 0)), ends(columns)])
     }
 
     /// Whether the occupied voxels hang together through their faces. An empty grid does not.
@@ -152,14 +110,120 @@ fn spread(mut seed: u64, within: u64) -> u64 {
     }
 }
 
+for_each_instruction_set! {
+    fn write_shape(words: &mut [u64], primitives: &[Primitive]) {
+        write_primitives(words, primitives);
+    }
+}
+
+for_each_instruction_set! {
+    fn count_ones(words: &[u64]) -> u32 {
+        words.iter().map(|w| w.count_ones()).sum()
+    }
+}
+
+/// Adds and subtracts in order.
+#[inline(always)]
+fn write_primitives(words: &mut [u64], primitives: &[Primitive]) {
+    for p in primitives {
+        let within: [u64; 3] = std::array::from_fn(|a| covered(p.center[a], p.half[a]));
+        match p.kind {
+            Kind::Cuboid => {
+                let layer = std::array::from_fn(|y| if within[1] >> y & 1 == 1 { within[2] } else { 0 });
+                write_layers(words, p.additive, within[0], |_| layer);
+            }
+            Kind::Cylinder { axis } => write_prism(words, p, &within, axis, |a, b| a * a + b * b <= 1.0),
+            Kind::Wedge { axis, corner } => {
+                let [u, v] = corner.map(f64::from);
+                write_prism(words, p, &within, axis, |a, b| u * a + v * b >= 0.0);
+            }
+        }
+    }
+}
+
+/// The voxels whose centre lies within `half` of `center` along one axis, a bit each.
+#[inline(always)]
+fn covered(center: f64, half: f64) -> u64 {
+    mask(|i| (CENTERS[i] - center).abs() <= half)
+}
+
+/// Writes the same section all along an axis; `inside` is asked by offsets along the two cross axes, in half sizes.
+#[inline(always)]
+fn write_prism(
+    words: &mut [u64],
+    p: &Primitive,
+    within: &[u64; 3],
+    axis: usize,
+    inside: impl Fn(f64, f64) -> bool,
+) {
+    let (u, v) = cross_axes(axis);
+    let offsets =
+        |a: usize| -> [f64; SIDE] { std::array::from_fn(|i| (CENTERS[i] - p.center[a]) / p.half[a]) };
+    let (along_u, along_v) = (offsets(u), offsets(v));
+    // Columns along z in the order of y: one for each y, or the same for all of them.
+    let section = |i: usize| within[2] & mask(|z| inside(along_u[i], along_v[z]));
+    let rows = |column: u64| std::array::from_fn(|y| if within[1] >> y & 1 == 1 { column } else { 0 });
+    match axis {
+        0 => {
+            let layer = std::array::from_fn(|y| if within[1] >> y & 1 == 1 { section(y) } else { 0 });
+            write_layers(words, p.additive, within[0], |_| layer);
+        }
+        1 => write_layers(words, p.additive, within[0], |x| rows(section(x))),
+        _ => write_layers(words, p.additive, within[0], |x| {
+            let row: [u64; SIDE] = rows(within[2]);
+            std::array::from_fn(|y| if inside(along_u[x], along_v[y]) { row[y] } else { 0 })
+        }),
+    }
+}
+
+/// Adds or takes away one layer of columns, 64 along y, at each of the set bits of `xs`.
+#[inline(always)]
+fn write_layers(words: &mut [u64], additive: bool, xs: u64, layer: impl Fn(usize) -> [u64; SIDE]) {
+    let layers = &mut words.as_chunks_mut::<SIDE>().0;
+    for x in xs.trailing_zeros() as usize..SIDE - xs.leading_zeros() as usize {
+        let columns = layer(x);
+        if additive {
+            layers[x].iter_mut().zip(columns).for_each(|(word, column)| *word |= column);
+        } else {
+            layers[x].iter_mut().zip(columns).for_each(|(word, column)| *word &= !column);
+        }
+    }
+}
+
+#[inline(always)]
 fn mask(inside: impl Fn(usize) -> bool) -> u64 {
-    (0..SIDE).fold(0, |word, z| word | u64::from(inside(z)) << z)
+    (0..SIDE).fold(0, |word, i| word | u64::from(inside(i)) << i)
+}
+
+// Four words of 64 bits are what the next two are made for: with eight, the compiler takes eight columns at a time and
+// scatters their bytes.
+#[multiversion::multiversion(targets("x86_64+avx2"))]
+fn spread_words(words: &[u64]) -> Vec<[u8; SIDE]> {
+    words.iter().map(|&word| spread_bits(word)).collect()
+}
+
+#[multiversion::multiversion(targets("x86_64+avx2"))]
+fn write_words(words: &[u64], out: &mut [u8]) {
+    words.iter().zip(out.as_chunks_mut().0).for_each(|(&word, bytes)| *bytes = spread_bits(word));
+}
+
+/// One byte a bit, 0 or 1.
+#[inline(always)]
+fn spread_bits(word: u64) -> [u8; SIDE] {
+    let mut bytes = [0; SIDE];
+    if word != 0 {
+        for (k, eight) in bytes.as_chunks_mut().0.iter_mut().enumerate() {
+            // Eight bits, repeated in eight bytes, of which each keeps its own; that is then carried to the top.
+            let bits = ((word >> (8 * k) & 0xff) * 0x0101_0101_0101_0101) & 0x8040_2010_0804_0201;
+            *eight = ((bits + 0x7f7f_7f7f_7f7f_7f7f) >> 7 & 0x0101_0101_0101_0101).to_le_bytes();
+        }
+    }
+    bytes
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::csg::Primitive;
     use glam::DVec3;
     use proptest::prelude::*;
 
@@ -182,8 +246,13 @@ mod tests {
             primitives in prop::collection::vec(any_primitive(), 1..8)
         ) {
             let shape = Shape::new(primitives).unwrap();
+            let grid = BitGrid::of_shape(&shape);
+            let mut baseline = BitGrid::default();
+            write_primitives(&mut baseline.words, shape.primitives());
+            prop_assert_eq!(&grid, &baseline);
             let mut bytes = vec![0; CELLS];
-            BitGrid::of_shape(&shape).write_bytes(&mut bytes);
+            grid.write_bytes(&mut bytes);
+            prop_assert_eq!(&grid.to_bytes(), &bytes);
             for (i, &byte) in bytes.iter().enumerate() {
                 let at = [i / 4096, i / 64 % 64, i % 64].map(voxel_center);
                 prop_assert_eq!(byte == 1, shape.contains(DVec3::from(at)));

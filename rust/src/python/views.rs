@@ -92,9 +92,9 @@ pub fn lines<'py>(
     let made = Buffers { depth, normal, size };
     let config = LineConfig { depth_step, crease_degrees };
     config.check()?;
-    let ink = py.detach(|| detect(&made, &config));
-    let bytes: Vec<u8> = ink.iter().map(|&i| if i { 255 } else { 0 }).collect();
-    bytes.into_pyarray(py).reshape([size, size])
+    let mut ink = vec![0; size * size];
+    py.detach(|| detect(&made, &config, &mut ink));
+    ink.into_pyarray(py).reshape([size, size])
 }
 
 #[pyfunction]
@@ -106,5 +106,5 @@ pub fn draw<'py>(
     out: Option<Bound<'py, PyArrayDyn<u8>>>,
 ) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
     let (shape, camera) = (shape_of(&shape)?, camera_of(&camera)?);
-    filled(py, out, &[IMAGE; 2], |out| crate::batch::draw(&shape, &camera, &LineConfig::default(), out))
+    filled(py, out, &[IMAGE; 2], |out| crate::lines::draw(&shape, &camera, &LineConfig::default(), out))
 }

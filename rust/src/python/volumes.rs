@@ -1,6 +1,8 @@
 //! Volumes: made of a shape, read in another grid, and the surface that leaves the package.
 
-use super::arrays::{GRIDS, all_finite, cameras_of, checked, checked_mut, filled, same_count, shape_of};
+use super::arrays::{
+    GRIDS, all_finite, cameras_of, checked, checked_mut, filled, grid, same_count, shape_of,
+};
 use crate::mesh::BilateralSettings;
 use crate::resample;
 use crate::voxel::{BitGrid, CELLS, SIDE};
@@ -15,6 +17,9 @@ pub fn voxelize<'py>(
     out: Option<Bound<'py, PyArrayDyn<u8>>>,
 ) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
     let shape = shape_of(&shape)?;
+    if out.is_none() {
+        return grid(py, py.detach(|| BitGrid::of_shape(&shape).to_bytes()), &[]);
+    }
     filled(py, out, &[SIDE; 3], |voxels| {
         BitGrid::of_shape(&shape).write_bytes(voxels);
         Ok(())
