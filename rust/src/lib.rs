@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! random -> grammar -> csg ------> voxel                      the truth, world grid
+//!         triangle mesh -> solid ----^
 //!                       |
 //!                     camera ----> raycast -> buffers -> lines -> pen       the drawing
 //!                                     |
@@ -35,4 +36,5 @@ mod python;
 pub mod random;
 pub mod raycast;
 pub mod resample;
+pub mod solid;
 pub mod voxel;

@@ -25,6 +25,12 @@ impl Default for BitGrid {
 }
 
 impl BitGrid {
+    /// The grid of 64 x 64 words, in the order of the columns.
+    pub fn of_words(words: Vec<u64>) -> Self {
+        assert_eq!(words.len(), SIDE * SIDE, "a grid has one word for each column");
+        Self { words }
+    }
+
     /// The voxels whose centre lies inside the shape.
     pub fn of_shape(shape: &Shape) -> Self {
         let mut grid = Self::default();

@@ -3,6 +3,7 @@
 use super::arrays::{GRIDS, all_finite, cameras_of, checked, checked_mut, grid, same_count, shape_of};
 use crate::mesh::BilateralSettings;
 use crate::resample;
+use crate::solid;
 use crate::voxel::{BitGrid, CELLS};
 use numpy::{IntoPyArray, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
@@ -19,6 +20,23 @@ pub fn voxelize<'py>(
         BitGrid::of_shape(&shape).write_bytes(&mut bytes);
         bytes
     });
+    grid(py, voxels, &[])
+}
+
+#[pyfunction]
+pub fn voxelize_mesh<'py>(
+    py: Python<'py>,
+    vertices: PyReadonlyArrayDyn<'py, f64>,
+    faces: PyReadonlyArrayDyn<'py, i64>,
+) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
+    let vertices = checked(&vertices, "vertices", &[-1, 3])?.as_chunks::<3>().0;
+    let faces = checked(&faces, "faces", &[-1, 3])?.as_chunks::<3>().0;
+    let voxels = py.detach(|| {
+        let solid = solid::voxelize(vertices, faces)?;
+        let mut bytes = vec![0; CELLS];
+        solid.write_bytes(&mut bytes);
+        Ok::<_, PyErr>(bytes)
+    })?;
     grid(py, voxels, &[])
 }
 
