@@ -83,12 +83,12 @@ impl Frame {
         for (i, &index) in faces.as_flattened().iter().enumerate() {
             *named.get_mut(index as usize).ok_or(SolidError::Index { face: i / 3, index, count })? = true;
         }
-        let (mut low, mut high, mut nothing) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3], 0.0);
+        let (mut low, mut high, mut nothing) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3], [0.0; 3]);
         let grow = |vertex: &[f64; 3]| {
             for (axis, &v) in vertex.iter().enumerate() {
                 low[axis] = if v < low[axis] { v } else { low[axis] };
                 high[axis] = if v > high[axis] { v } else { high[axis] };
-                nothing += v * 0.0; // NaN, if v is not finite
+                nothing[axis] += v * 0.0; // NaN, if v is not finite
             }
         };
         let used = |i: &usize| named[*i];
@@ -97,7 +97,7 @@ impl Frame {
         } else {
             (0..count).filter(used).map(|i| &vertices[i]).for_each(grow);
         }
-        if nothing != 0.0 {
+        if nothing != [0.0; 3] {
             let bad = (0..count).filter(used).find(|&i| vertices[i].iter().any(|v| !v.is_finite()));
             return Err(SolidError::Vertex(bad.unwrap_or(0)));
         }

@@ -34,7 +34,7 @@ pub fn point(place: [f64; 3]) -> Point {
 /// has crossed before it reaches each voxel.
 pub struct Crossings {
     /// The lowest digits: of crossings into what lies on the far side of a face, and of those out of it.
-    first: Box<[[u64; 2]; COLUMNS]>,
+    first: [[u64; 2]; COLUMNS],
     /// The higher digits, as many as it takes.
     higher: Vec<Box<[[u64; 2]; COLUMNS]>>,
     boundary: i64,
@@ -49,7 +49,7 @@ pub struct Vote {
 
 impl Crossings {
     pub fn of(points: &[Point], faces: &[[i64; 3]]) -> Self {
-        let mut crossings = Self { first: blank(), higher: Vec::new(), boundary: 0 };
+        let mut crossings = Self { first: [[0; 2]; COLUMNS], higher: Vec::new(), boundary: 0 };
         let corners = |face: &[i64; 3]| face.map(|i| points[i as usize]);
         let mut kept = [0; CHUNK];
         for faces in faces.chunks(CHUNK) {
@@ -57,7 +57,7 @@ impl Crossings {
             for (i, face) in faces.iter().enumerate() {
                 let [a, b, c] = corners(face);
                 crossings.boundary = crossings.boundary.wrapping_add(boundary([a, b, c].map(|p| p[3])));
-                let [x, y, ..] = columns(a, b, c);
+                let [x, y] = columns(a, b, c);
                 kept[count] = i;
                 count += usize::from((x.0 <= x.1) & (y.0 <= y.1));
             }
@@ -82,25 +82,24 @@ impl Crossings {
 
     /// The voxels around which the surface winds.
     pub fn winding(&self) -> Vec<u64> {
-        (0..COLUMNS).map(|column| self.wound(column)).collect()
-    }
-
-    fn wound(&self, column: usize) -> u64 {
-        let differ = |[up, down]: [u64; 2]| up ^ down;
-        self.higher.iter().fold(differ(self.first[column]), |all, digit| all | differ(digit[column]))
+        let mut words: Vec<u64> = self.first.iter().map(differing).collect();
+        for digit in &self.higher {
+            words.iter_mut().zip(digit.iter().map(differing)).for_each(|(word, more)| *word |= more);
+        }
+        words
     }
 
     /// A ray that leaves as often as it enters votes by winding, one that crosses an even number of faces by parity.
     pub fn votes(&self) -> Vec<Vote> {
-        let vote = |column| {
-            let (wound, odd) = (self.wound(column), self.first[column][0] ^ self.first[column][1]);
+        let vote = |(wound, digit): (u64, &[u64; 2])| {
+            let odd = differing(digit);
             match (wound >> (SIDE - 1), odd >> (SIDE - 1)) {
                 (0, _) => Vote { inside: wound, outside: !wound },
                 (_, 0) => Vote { inside: odd, outside: !odd },
                 _ => Vote::default(),
             }
         };
-        (0..COLUMNS).map(vote).collect()
+        self.winding().into_iter().zip(&self.first).map(vote).collect()
     }
 
     /// The winding number of a voxel as seen from below plus that as seen from above.
@@ -110,7 +109,9 @@ impl Crossings {
 
     fn balance(&self, column: usize, voxel: usize) -> i64 {
         let bit = |word: u64| (word >> voxel & 1) as i64;
-        let digits = std::iter::once(&self.first).chain(&self.higher).map(|digit| digit[column]);
+        let digits = std::iter::once(&self.first)
+            .chain(self.higher.iter().map(|digit| &**digit))
+            .map(|digit| digit[column]);
         digits.enumerate().map(|(k, [up, down])| (bit(up) - bit(down)) << k).sum()
     }
 
@@ -182,14 +183,14 @@ impl Crossings {
                 return;
             }
         }
-        let mut digits = blank();
+        let mut digits = Box::new([[0; 2]; COLUMNS]);
         digits[column][side] = carry;
         self.higher.push(digits);
     }
 }
 
-fn blank() -> Box<[[u64; 2]; COLUMNS]> {
-    Box::new([[0; 2]; COLUMNS])
+fn differing([up, down]: &[u64; 2]) -> u64 {
+    up ^ down
 }
 
 /// One edge of a face that is seen anticlockwise.
