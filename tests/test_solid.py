@@ -54,7 +54,9 @@ def parts(draw):
     mesh = _primitive(draw(st.sampled_from(kinds)), draw(st.integers(3, 12)))
     turn = draw(st.sampled_from(["straight", "anyhow"]))
     if turn == "anyhow":
-        mesh.apply_transform(trimesh.transformations.random_rotation_matrix(np.array(draw(st.tuples(*[st.floats(0, 1)] * 3)))))
+        mesh.apply_transform(
+            trimesh.transformations.random_rotation_matrix(np.array(draw(st.tuples(*[st.floats(0, 1)] * 3))))
+        )
     mesh.apply_scale(draw(st.tuples(*[st.floats(0.1, 0.4)] * 3)))
     mesh.apply_translation(draw(st.tuples(*[st.floats(-0.1, 0.1)] * 3)))
     if draw(st.booleans()):

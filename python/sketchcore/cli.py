@@ -159,5 +159,28 @@ def evaluate(
         _console.print(as_table(report))
 
 
+@app.command()
+def bench(
+    repetitions: Annotated[int, typer.Option(help="Each figure is the median of so many.")] = 15,
+    as_json: Json = False,
+) -> None:
+    """Measure the kernels beside what one would otherwise use, on this machine, in one run.
+
+    For each job: our time, the time that no program could beat here (floor), each peer's time, and the ratio. One
+    thread, unless the job says otherwise. The peers come with pip install 'sketchcore[bench]'; the missing ones are
+    named.
+    """
+    with _errors():
+        from sketchcore.bench import bench as measure
+        from sketchcore.bench.present import as_table as table
+
+        with _bar("jobs", 7) as show:
+            report = measure(repetitions, progress=lambda done, total: show(done))
+    if as_json:
+        typer.echo(json.dumps(report.to_dict()))
+    else:
+        _console.print(table(report))
+
+
 if __name__ == "__main__":
     app()
