@@ -133,9 +133,12 @@ void main() { color = vec4(seen.xyz, 1.0 / seen.w); }
 def opengl_drawing(camera: Camera) -> Callable[[NDArray[np.float64]], Callable[[], NDArray[np.uint8]]]:
     """Rasterising by OpenGL through EGL; a shape's mesh is built and uploaded before the drawing that is timed.
 
+    Depth and normals are 32-bit floats, as ours are.
+
     Raises:
         RuntimeError: if there is no EGL, or no driver behind it.
     """
+    import cv2
     import moderngl
 
     edges = opencv_edges()
@@ -170,7 +173,7 @@ def opengl_drawing(camera: Camera) -> Callable[[NDArray[np.float64]], Callable[[
             frame.clear(0.0, 0.0, 0.0, 0.0)
             array.render()
             frame.read_into(read, components=4, dtype="f4")
-            return edges(np.ascontiguousarray(read[..., 3]), np.ascontiguousarray(read[..., :3]))
+            return edges(cv2.extractChannel(read, 3), cv2.cvtColor(read, cv2.COLOR_RGBA2RGB))
 
         return draw
 
