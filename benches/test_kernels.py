@@ -57,7 +57,7 @@ def test_to_camera_grid(benchmark):
 
 @pytest.mark.benchmark(group="world grid -> camera grid")
 def test_to_camera_grid_torch(benchmark):
-    made = benchmark(torch_resampling(CAMERA)[0], VOLUME)
+    made = benchmark(torch_resampling(CAMERA)[0], VOLUME[0])
     np.testing.assert_allclose(made, _core.to_camera_grid(VOLUME, CAMERA.packed[None])[0], atol=1e-4)
 
 

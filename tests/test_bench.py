@@ -8,11 +8,12 @@ import math
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 from scipy import ndimage
 from typer.testing import CliRunner
 
 import sketchcore as sk
-from sketchcore.bench import jobs
+from sketchcore.bench import growth, jobs
 from sketchcore.bench.drawings import embree_drawing, opengl_drawing
 from sketchcore.bench.machine import Machine
 from sketchcore.bench.present import as_table
@@ -59,6 +60,25 @@ def test_the_command_reports_every_job(monkeypatch):
             assert peer["met"] == (peer["ratio"] <= peer["bar"] if row["cost"] else peer["ratio"] >= peer["bar"])
     # These come with the package.
     assert all(rows[i]["peers"][0]["missing"] is None for i in (0, 2, 3, 5))
+
+
+@pytest.mark.slow
+def test_growth_is_measured_and_plotted(monkeypatch, tmp_path):
+    for name, small in (("PRIMITIVES", (1, 2, 3, 4)), ("SIZES", (64, 65)), ("TRIANGLES", (100, 200)), ("SAMPLES", 2)):
+        monkeypatch.setattr(growth, name, small)
+    done = []
+    curves = growth.growth(1, progress=lambda *at: done.append(at))
+    assert done == [(i, 5) for i in range(1, 6)]
+    assert [len(curve.work) for curve in curves[:4]] == [4, 4, 2, 2]
+    for curve in curves:
+        assert len(curve.seconds) == len(curve.work)
+        assert sorted(curve.work) == curve.work
+        assert all(0 < seconds < 10 for seconds in curve.seconds)
+    growth.save_plot(curves, tmp_path / "growth.png")
+    with Image.open(tmp_path / "growth.png") as image:
+        assert image.width > 1000
+    with pytest.raises(ValueError, match=r"written as \.png"):
+        growth.save_plot(curves, tmp_path / "growth.pdf")
 
 
 def test_repetitions_are_checked():

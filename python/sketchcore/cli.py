@@ -162,6 +162,7 @@ def evaluate(
 @app.command()
 def bench(
     repetitions: Annotated[int, typer.Option(help="Each figure is the median of so many.")] = 15,
+    growth: Annotated[Path | None, typer.Option(help="Also plot how cost grows with work, as PNG.")] = None,
     as_json: Json = False,
 ) -> None:
     """Measure the kernels beside what one would otherwise use, on this machine, in one run.
@@ -171,13 +172,22 @@ def bench(
     named.
     """
     with _errors():
+        from dataclasses import asdict
+
         from sketchcore.bench import bench as measure
+        from sketchcore.bench.growth import Curve, save_plot
+        from sketchcore.bench.growth import growth as measure_growth
         from sketchcore.bench.present import as_table as table
 
         with _bar("jobs", 7) as show:
             report = measure(repetitions, progress=lambda done, total: show(done))
+        curves: list[Curve] = []
+        if growth is not None:
+            with _bar("growth", 5) as show:
+                curves = measure_growth(repetitions, progress=lambda done, total: show(done))
+            save_plot(curves, growth)
     if as_json:
-        typer.echo(json.dumps(report.to_dict()))
+        typer.echo(json.dumps(report.to_dict() | {"growth": [asdict(curve) for curve in curves]}))
     else:
         _console.print(table(report))
 
