@@ -26,8 +26,19 @@ def torus(triangles: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 
 
 def open3d_solid(faces: NDArray[np.int64]) -> Callable[[NDArray[np.float64]], NDArray[np.uint8]]:
-    """A mesh's voxels from its vertices: scaled as ours, its tree built, all crossings listed, on all cores."""
-    import open3d
+    """A mesh's voxels from its vertices: scaled as ours, its tree built, all crossings listed, on all cores.
+
+    Raises:
+        ModuleNotFoundError: if Open3D is not installed.
+        RuntimeError: if a library is missing that it needs.
+    """
+    try:
+        import open3d
+    except ModuleNotFoundError:
+        raise
+    except ImportError as error:
+        remedy = "apt-get install libusb-1.0-0 libgl1 libx11-6 libgomp1"
+        raise RuntimeError(f"Open3D does not start ({error}); on Debian: {remedy}") from None
 
     rays = np.zeros((SIDE, SIDE, 6), np.float32)
     rays[..., 0], rays[..., 1] = _CENTERS[:, None] + _BESIDE[0], _CENTERS + _BESIDE[1]
