@@ -51,7 +51,10 @@ test-python: $(BUILT)
 demo: $(BUILT)
 	$(BIN)/python examples/demo.py
 
+# Kernels and calls beside what one would otherwise use; the peers (about 1.5 GB) are installed first.
 bench: $(BUILT)
+	$(BIN)/maturin develop --release --quiet --extras bench
+	$(BIN)/sketchcore bench
 	cargo bench --quiet
 	$(BIN)/pytest --quiet benches
 

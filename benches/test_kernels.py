@@ -1,7 +1,6 @@
-"""Kernels beside what one would otherwise use, on the same data in the same run: `make bench`.
+"""Python calls of the kernels beside what one would otherwise use, on the same data in the same run: `make bench`.
 
-Each group holds ours and a peer; the table's ratio is the figure to quote. `grid_sample` gets its coordinates for free,
-`embedding_bag` its rows and weights.
+Each group holds ours and a peer, where `sketchcore bench` has none; `embedding_bag` gets its rows and weights for free.
 """
 
 from __future__ import annotations
@@ -12,6 +11,9 @@ import torch
 
 import sketchcore as sk
 from sketchcore import _core
+from sketchcore.bench.resampling import torch_resampling
+from sketchcore.bench.solids import torus
+from sketchcore.bench.voxels import numpy_voxels
 
 CAMERA = sk.VIEWPOINTS["quarter-037"]
 BATCH = sk.generate(0, 1)
@@ -31,24 +33,6 @@ def _one_thread():
     torch.set_num_threads(1)
     yield
     torch.set_num_threads(threads)
-
-
-def numpy_voxels(rows: np.ndarray) -> np.ndarray:
-    grid = np.zeros((64, 64, 64), np.uint8)
-    centers = (np.arange(64) + 0.5) / 64 - 0.5
-    for kind, op, *numbers in rows:
-        center, half = np.array(numbers[:3]), np.array(numbers[3:])
-        ends = [np.searchsorted(centers, (c - h, c + h)) for c, h in zip(center, half, strict=True)]
-        slab = tuple(slice(lo, hi) for lo, hi in ends)
-        if kind == 0:
-            grid[slab] = op
-            continue
-        axis = int(kind) - 1
-        u, v = (a for a in range(3) if a != axis)
-        du, dv = (((centers[slab[a]] - center[a]) / half[a]) ** 2 for a in (u, v))
-        disc = np.expand_dims(du[:, None] + dv[None, :] <= 1, axis)
-        grid[slab] = np.where(disc, np.uint8(op), grid[slab])
-    return grid
 
 
 def embedding_bag(features: torch.Tensor) -> torch.Tensor:
@@ -73,14 +57,14 @@ def test_to_camera_grid(benchmark):
 
 @pytest.mark.benchmark(group="world grid -> camera grid")
 def test_to_camera_grid_torch(benchmark):
-    depth = CAMERA.near + (np.arange(64) + 0.5) / 64 * (CAMERA.far - CAMERA.near)
-    at = ((2 * np.arange(64) + 1) / 64 - 1) * np.tan(np.radians(CAMERA.fov_degrees / 2))
-    rays = np.stack([*np.meshgrid(at, at), np.ones((64, 64))], axis=-1) @ CAMERA.rotation
-    points = CAMERA.position + depth[:, None, None, None] * rays
-    grid = torch.from_numpy(2 * points[..., ::-1].astype(np.float32).copy())[None]
-    volume = torch.from_numpy(VOLUME)[None]
-    made = benchmark(torch.nn.functional.grid_sample, volume, grid, align_corners=False)
-    np.testing.assert_allclose(made[0, 0].numpy(), _core.to_camera_grid(VOLUME, CAMERA.packed[None])[0], atol=1e-4)
+    made = benchmark(torch_resampling(CAMERA)[0], VOLUME[0])
+    np.testing.assert_allclose(made, _core.to_camera_grid(VOLUME, CAMERA.packed[None])[0], atol=1e-4)
+
+
+@pytest.mark.benchmark(group="mesh -> solid")
+@pytest.mark.parametrize("triangles", [100, 5_000, 100_000, 1_000_000])
+def test_voxelize_mesh(benchmark, triangles):
+    benchmark(_core.voxelize_mesh, *torus(triangles))
 
 
 @pytest.mark.benchmark(group="six drawings -> evidence")

@@ -25,10 +25,14 @@ __all__ = [
     "to_world_grid",
     "viewpoints",
     "voxelize",
+    "voxelize_mesh",
 ]
 
 def viewpoints() -> NDArray[np.float64]: ...
 def voxelize(shape: NDArray[np.float64], out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]: ...
+def voxelize_mesh(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], out: NDArray[np.uint8] | None = None
+) -> NDArray[np.uint8]: ...
 def frustum(shape: NDArray[np.float64], camera: NDArray[np.float64], rays: int) -> NDArray[np.uint8]: ...
 def buffers(
     shape: NDArray[np.float64], camera: NDArray[np.float64], size: int

@@ -159,5 +159,38 @@ def evaluate(
         _console.print(as_table(report))
 
 
+@app.command()
+def bench(
+    repetitions: Annotated[int, typer.Option(help="Each figure is the median of so many.")] = 15,
+    growth: Annotated[Path | None, typer.Option(help="Also plot how cost grows with work, as PNG.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Measure the kernels beside what one would otherwise use, on this machine, in one run.
+
+    For each job: our time, the time that no program could beat here (floor), each peer's time, and the ratio. One
+    thread, unless the job says otherwise. The peers come with pip install 'sketchcore[bench]'; the missing ones are
+    named.
+    """
+    with _errors():
+        from dataclasses import asdict
+
+        from sketchcore.bench import bench as measure
+        from sketchcore.bench.growth import Curve, save_plot
+        from sketchcore.bench.growth import growth as measure_growth
+        from sketchcore.bench.present import as_table as table
+
+        with _bar("jobs", 7) as show:
+            report = measure(repetitions, progress=lambda done, total: show(done))
+        curves: list[Curve] = []
+        if growth is not None:
+            with _bar("growth", 5) as show:
+                curves = measure_growth(repetitions, progress=lambda done, total: show(done))
+            save_plot(curves, growth)
+    if as_json:
+        typer.echo(json.dumps(report.to_dict() | {"growth": [asdict(curve) for curve in curves]}))
+    else:
+        _console.print(table(report))
+
+
 if __name__ == "__main__":
     app()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,9 @@ from sketchcore.camera import Camera, pack_cameras
 from sketchcore.destination import destination
 from sketchcore.shape import Shape
 
+if TYPE_CHECKING:
+    import trimesh
+
 SIDE = 64
 IMAGE = 256
 
@@ -19,7 +24,7 @@ IMAGE = 256
 def _as_shape(shape: object) -> Shape:
     if isinstance(shape, Shape):
         return shape
-    raise TypeError(f"expected a sketchcore.Shape, got {type(shape).__name__}; meshes are not supported yet")
+    raise TypeError(f"expected a sketchcore.Shape, got {type(shape).__name__}; only voxelize takes meshes")
 
 
 def _as_camera(camera: object) -> Camera:
@@ -28,18 +33,37 @@ def _as_camera(camera: object) -> Camera:
     raise TypeError(f"expected a sketchcore.Camera, got {type(camera).__name__}")
 
 
-def voxelize(shape: Shape, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
-    """The world grid of a shape as it stands: uint8 [64, 64, 64] (x, y, z), 1 where a voxel's centre is inside.
+def _as_mesh(mesh: object) -> trimesh.Trimesh | None:
+    # Who has a mesh has imported trimesh; nobody else should wait for it.
+    module = sys.modules.get("trimesh")
+    return mesh if module is not None and isinstance(mesh, module.Trimesh) else None
+
+
+def voxelize(shape: Shape | trimesh.Trimesh, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
+    """The world grid of a solid: uint8 [64, 64, 64] (x, y, z), 1 where a voxel's centre is inside.
+
+    A `Shape` is taken as it stands. A mesh, y up, is scaled and centred: the grid's cube is 120 % of the largest side
+    of its bounding box. Its inside is where the surface winds around: parts that overlap are one solid, cavities stay
+    hollow, and all faces may be inside out. Meshes with holes or with faces turned over are decided by the majority of
+    rays along the three axes; a sheet that encloses nothing leaves no voxels (rust/src/solid.rs says more).
 
     Args:
-        shape: the shape.
+        shape: the shape or mesh.
         out: an array of the result's shape and dtype to write into, and to return.
 
     Raises:
-        ValueError: for an `out` of another shape, not C-contiguous or not writeable.
-        TypeError: for anything but a `Shape`, or an `out` of another dtype.
+        ValueError: for a mesh without faces or extent, with an index out of range, or with NaN or infinity in a vertex;
+            for an `out` of another shape, not C-contiguous or not writeable.
+        TypeError: for anything but a `Shape` or a `trimesh.Trimesh`, or an `out` of another dtype.
     """
-    return _core.voxelize(_as_shape(shape).packed, destination(out, (SIDE,) * 3, np.uint8))
+    into = destination(out, (SIDE,) * 3, np.uint8)
+    mesh = _as_mesh(shape)
+    if mesh is not None:
+        vertices, faces = np.ascontiguousarray(mesh.vertices, np.float64), np.ascontiguousarray(mesh.faces, np.int64)
+        return _core.voxelize_mesh(vertices, faces, into)
+    if not isinstance(shape, Shape):
+        raise TypeError(f"expected a trimesh.Trimesh or a sketchcore.Shape, got {type(shape).__name__}")
+    return _core.voxelize(shape.packed, into)
 
 
 def frustum(shape: Shape, camera: Camera, rays: int = 4) -> NDArray[np.uint8]:

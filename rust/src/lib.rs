@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! random -> grammar -> csg ------> voxel                      the truth, world grid
+//!         triangle mesh -> solid ----^
 //!                       |
 //!                     camera ----> raycast -> buffers -> lines -> pen       the drawing
 //!                                     |
@@ -39,5 +40,6 @@ mod python;
 pub mod random;
 pub mod raycast;
 pub mod resample;
+pub mod solid;
 pub mod trilinear;
 pub mod voxel;

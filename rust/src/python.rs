@@ -11,6 +11,7 @@ mod volumes;
 
 use crate::error::CoreError;
 use crate::mesh::MeshError;
+use crate::solid::SolidError;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
@@ -31,6 +32,12 @@ impl From<MeshError> for PyErr {
     }
 }
 
+impl From<SolidError> for PyErr {
+    fn from(error: SolidError) -> Self {
+        PyValueError::new_err(error.to_string())
+    }
+}
+
 #[pymodule]
 mod _core {
     #[pymodule_export]
@@ -42,5 +49,5 @@ mod _core {
     #[pymodule_export]
     use super::views::{buffers, draw, frustum, isosurface, lines, viewpoints};
     #[pymodule_export]
-    use super::volumes::{bilateral, to_camera_grid, to_world_grid, voxelize};
+    use super::volumes::{bilateral, to_camera_grid, to_world_grid, voxelize, voxelize_mesh};
 }

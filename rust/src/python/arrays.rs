@@ -75,17 +75,17 @@ pub fn all_finite(values: &[f32], what: &'static str) -> Result<(), CoreError> {
 }
 
 /// Fills `out`, or a fresh array where there is none, and returns it.
-pub fn filled<'py, T: Element>(
+pub fn filled<'py, T: Element, E: Into<PyErr> + Send>(
     py: Python<'py>,
     out: Option<Bound<'py, PyArrayDyn<T>>>,
     shape: &[usize],
-    fill: impl FnOnce(&mut [T]) -> Result<(), CoreError> + Send,
+    fill: impl FnOnce(&mut [T]) -> Result<(), E> + Send,
 ) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
     let array = out.unwrap_or_else(|| PyArrayDyn::zeros(py, shape, false));
     let mut writable = array.try_readwrite()?;
     let expected: Vec<isize> = shape.iter().map(|&s| s as isize).collect();
     let cells = checked_mut(&mut writable, "out", &expected)?;
-    py.detach(|| fill(cells))?;
+    py.detach(|| fill(cells)).map_err(Into::into)?;
     drop(writable);
     Ok(array)
 }

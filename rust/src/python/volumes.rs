@@ -5,6 +5,7 @@ use super::arrays::{
 };
 use crate::mesh::BilateralSettings;
 use crate::resample;
+use crate::solid;
 use crate::voxel::{BitGrid, CELLS, SIDE};
 use numpy::{IntoPyArray, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
@@ -17,12 +18,25 @@ pub fn voxelize<'py>(
     out: Option<Bound<'py, PyArrayDyn<u8>>>,
 ) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
     let shape = shape_of(&shape)?;
-    if out.is_none() {
-        return grid(py, py.detach(|| BitGrid::of_shape(&shape).to_bytes()), &[]);
-    }
     filled(py, out, &[SIDE; 3], |voxels| {
         BitGrid::of_shape(&shape).write_bytes(voxels);
-        Ok(())
+        Ok::<_, PyErr>(())
+    })
+}
+
+#[pyfunction]
+#[pyo3(signature = (vertices, faces, out=None))]
+pub fn voxelize_mesh<'py>(
+    py: Python<'py>,
+    vertices: PyReadonlyArrayDyn<'py, f64>,
+    faces: PyReadonlyArrayDyn<'py, i64>,
+    out: Option<Bound<'py, PyArrayDyn<u8>>>,
+) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
+    let vertices = checked(&vertices, "vertices", &[-1, 3])?.as_chunks::<3>().0;
+    let faces = checked(&faces, "faces", &[-1, 3])?.as_chunks::<3>().0;
+    filled(py, out, &[SIDE; 3], |voxels| {
+        solid::voxelize(vertices, faces)?.write_bytes(voxels);
+        Ok::<_, PyErr>(())
     })
 }
 
