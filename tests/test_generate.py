@@ -285,6 +285,20 @@ def test_slabs_are_wedges_without_their_right_angle():
     assert cuts > 32
 
 
+def test_fitted_primitives_are_as_wide_as_what_they_stand_on():
+    wide = {"cylinders": 0.0, "wedges": 0.5, "subtracted": 0.0, "steps": [2, 2]}
+    made = generate(0, 64, config={"grammar": {**wide, "fitted": 1.0}})
+    for shape in made.packed_shapes:
+        first, last = shape[0], shape[-1]
+        # Along the face, the second one's box covers the first one's; both halves of a gable together do.
+        low = np.minimum.reduce([p[2:5] - p[5:] for p in shape[1:]])
+        high = np.maximum.reduce([p[2:5] + p[5:] for p in shape[1:]])
+        equal = np.isclose(low, first[2:5] - first[5:]) & np.isclose(high, first[2:5] + first[5:])
+        assert equal.sum() >= 2 or last[4] == -shape[-2][4] != 0
+    loose = generate(0, 64, config={"grammar": wide})
+    assert any(not np.isclose(s[0, 5:], s[-1, 5:]).any() for s in loose.packed_shapes)
+
+
 def test_free_cameras_stand_anywhere():
     made = generate(0, 64, views=4, config={"free": {"share": 0.5, "elevation": [10, 50], "fov": [30, 50]}})
     fixed = generate(0, 64, views=4)
@@ -331,6 +345,7 @@ def test_the_default_config_is_complete_and_fresh():
         ({"free": {"share": -1}}, "free: share must lie between 0 and 1"),
         ({"free": {"elevation": [10, 90]}}, r"elevation \[least, most\] between -85 and 85"),
         ({"free": {"fov": [50, 30]}}, r"free\.fov must be \[least, most\] between 10 and 90"),
+        ({"grammar": {"fitted": -1}}, r"grammar\..*fitted.* between 0 and 1"),
         ({"grammar": {"slabs": 1.5}}, r"grammar\..*slabs.* between 0 and 1"),
         ({"grammar": {"slab_thickness": [0.5, 1]}}, r"grammar\.slab_thickness must be"),
         ({"hand": {"azimuth": 60}}, "hand: angles must lie between 0 and 45"),

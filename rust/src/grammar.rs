@@ -36,6 +36,9 @@ pub struct GrammarConfig {
     pub displaced: f64,
     /// Largest such displacement, in half sizes of the primitive that it is placed on.
     pub displacement: f64,
+    /// Chance that a cuboid or wedge is as wide as what it is placed on, in each of the two directions along the face: a
+    /// roof on its house.
+    pub fitted: f64,
     /// Deepest overlap with that primitive, in half sizes of the smaller.
     pub overlap: f64,
     /// How far a subtracted primitive's centre lies from the face, in its own half sizes.
@@ -63,6 +66,7 @@ impl Default for GrammarConfig {
             half: [0.03, 0.25],
             displaced: 0.5,
             displacement: 0.9,
+            fitted: 0.0,
             overlap: 0.2,
             sink: 0.1,
             cover: 1.2,
@@ -83,8 +87,11 @@ impl GrammarConfig {
         match self {
             c if !(1..=c.steps[1]).contains(&c.steps[0]) => bad("steps must be [least, most], from 1"),
             c if c.steps[1] > 500 => bad("steps must be at most 500"),
-            c if ![c.cylinders, c.wedges, c.slabs, c.subtracted, c.displaced].into_iter().all(share) => {
-                bad("cylinders, wedges, slabs, subtracted and displaced are shares between 0 and 1")
+            c if ![c.cylinders, c.wedges, c.slabs, c.fitted, c.subtracted, c.displaced]
+                .into_iter()
+                .all(share) =>
+            {
+                bad("cylinders, wedges, slabs, fitted, subtracted and displaced are shares between 0 and 1")
             }
             c if c.cylinders + c.wedges > 1.0 => bad("cylinders and wedges must be at most 1 together"),
             c if !(range(c.first_half) && range(c.half)) => {
@@ -159,8 +166,11 @@ impl GrammarConfig {
         let axis = random.below(3);
         let sign = if random.chance(0.5) { 1.0 } else { -1.0 };
         new.center = on.center;
+        let fits = self.fitted > 0.0 && !matches!(new.kind, Kind::Cylinder { .. });
         for along in [(axis + 1) % 3, (axis + 2) % 3] {
-            if random.chance(self.displaced) {
+            if fits && random.chance(self.fitted) {
+                new.half[along] = on.half[along];
+            } else if random.chance(self.displaced) {
                 new.center[along] += random.around(self.displacement) * on.half[along];
             }
         }
@@ -232,7 +242,7 @@ mod tests {
     #[test]
     fn shapes_are_symmetric_connected_and_scaled() {
         let paper = GrammarConfig::default();
-        let wedges = GrammarConfig { wedges: 0.3, slabs: 0.5, ..paper.clone() };
+        let wedges = GrammarConfig { wedges: 0.3, slabs: 0.5, fitted: 0.4, ..paper.clone() };
         for (config, sample) in (0..200).flat_map(|i| [(&paper, i), (&wedges, i)]) {
             let (shape, grid) = config.draw(&mut Random::new(7, sample, 0)).unwrap();
             assert!(grid.is_connected());
@@ -258,6 +268,7 @@ mod tests {
         assert!(with(|c| c.cylinders = 1.5).contains("between 0 and 1"));
         assert!(with(|c| c.wedges = -0.1).contains("between 0 and 1"));
         assert!(with(|c| c.wedges = 0.7).contains("at most 1 together"));
+        assert!(with(|c| c.fitted = 1.1).contains("between 0 and 1"));
         assert!(with(|c| c.slabs = 2.0).contains("between 0 and 1"));
         assert!(with(|c| c.slab_thickness = [0.5, 1.0]).contains("slab_thickness"));
         assert!(with(|c| c.cover = f64::NAN).contains("cover"));
