@@ -1,8 +1,6 @@
 //! Volumes: made of a shape, read in another grid, and the surface that leaves the package.
 
-use super::arrays::{
-    GRIDS, all_finite, cameras_of, checked, checked_mut, filled, grid, same_count, shape_of,
-};
+use super::arrays::{GRIDS, all_finite, cameras_of, checked, checked_mut, filled, same_count, shape_of};
 use crate::mesh::BilateralSettings;
 use crate::resample;
 use crate::solid;
