@@ -73,9 +73,9 @@ fn shapes(group: &mut Group, shape: &Shape, camera: &Camera) {
         .bench_function("voxels", |b| b.iter(|| BitGrid::of_shape(black_box(shape)).write_bytes(&mut bytes)));
     group.bench_function("depth and normals", |b| b.iter(|| Buffers::of_shape(shape, camera, IMAGE)));
     let seen = Buffers::of_shape(shape, camera, IMAGE).unwrap();
-    group.bench_function("lines", |b| b.iter(|| detect(black_box(&seen), &LineConfig::default())));
     let mut drawing = vec![0; IMAGE * IMAGE];
     let config = LineConfig::default();
+    group.bench_function("lines", |b| b.iter(|| detect(black_box(&seen), &config, &mut drawing)));
     group.bench_function("draw", |b| b.iter(|| _core::lines::draw(shape, camera, &config, &mut drawing)));
     let rays = SampleConfig::default().frustum_rays;
     group.bench_function("frustum", |b| b.iter(|| fill_frustum(shape, camera, rays, &mut bytes)));

@@ -7,11 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import reference
+import reference_solid
 from sketchcore import _core
 from sketchcore.grids import SIDE, voxelize
 from sketchcore.mesh import extract_mesh
 
-FAR = 0.5 / reference.COVER
+FAR = 0.5 / reference_solid.COVER
 BALL = trimesh.creation.icosphere(2, 0.3)
 
 
@@ -23,7 +24,7 @@ def in_place(mesh):
 
 def nearness(mesh, voxels):
     """Distances of voxels' centres from the surface, world units."""
-    corners = reference.placed(mesh.vertices, mesh.faces)
+    corners = reference_solid.placed(mesh.vertices, mesh.faces)
     at = reference.voxel_centers()[tuple(voxels.T)]
     to = [trimesh.triangles.closest_point(corners, np.broadcast_to(p, (len(corners), 3))) for p in at]
     return np.array([np.linalg.norm(near - p, axis=1).min() for near, p in zip(to, at, strict=True)])
@@ -71,7 +72,7 @@ def parts(draw):
 @given(st.lists(parts(), min_size=1, max_size=3))
 def test_closed_meshes_are_what_a_ray_caster_finds(meshes):
     mesh = in_place(trimesh.util.concatenate(meshes))
-    same_but_at_the_surface(mesh, reference.closed_solid(mesh.vertices, mesh.faces))
+    same_but_at_the_surface(mesh, reference_solid.closed_solid(mesh.vertices, mesh.faces))
 
 
 @pytest.mark.slow
@@ -83,7 +84,7 @@ def test_open_meshes_are_decided_by_vote(mesh, data):
     kept = np.array([*kept, *[True] * 24])
     for faces in (mesh.faces[kept], np.where(kept[:, None], mesh.faces, mesh.faces[:, ::-1])):
         changed = trimesh.Trimesh(mesh.vertices, faces, process=False)
-        expected = reference.voted_solid(changed.vertices, faces)
+        expected = reference_solid.voted_solid(changed.vertices, faces)
         same_but_at_the_surface(changed, expected)
 
 
