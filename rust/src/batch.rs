@@ -203,8 +203,10 @@ pub fn batch(
     slots: Vec<Slot>,
     watch: &Watch,
 ) -> Result<Vec<(Shape, Vec<Camera>)>, CoreError> {
+    // One at a time: nobody waits at the end for a thread that still has several to make.
     slots
         .into_par_iter()
+        .with_max_len(1)
         .enumerate()
         .map(|(i, slot)| {
             if watch.stopped.load(Relaxed) {

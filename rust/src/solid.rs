@@ -19,8 +19,9 @@
 
 mod crossings;
 
+use crate::dispatch::for_each_instruction_set;
 use crate::voxel::{BitGrid, SIDE};
-use crossings::{COLUMNS, Crossings, ONE, Point, Vote, point};
+use crossings::{COLUMNS, Crossings, ONE, Point, Vote};
 use std::collections::HashSet;
 
 /// The world grid covers this much of a mesh's largest side: the paper's 120 %.
@@ -79,10 +80,14 @@ impl Frame {
             return Err(SolidError::NoFaces);
         }
         let count = vertices.len();
-        let mut named = vec![false; count];
-        for (i, &index) in faces.as_flattened().iter().enumerate() {
-            *named.get_mut(index as usize).ok_or(SolidError::Index { face: i / 3, index, count })? = true;
+        let indices = faces.as_flattened();
+        // Negative indices are large ones.
+        if largest(indices) >= count as u64 {
+            let i = indices.iter().position(|&index| index as u64 >= count as u64).unwrap_or(0);
+            return Err(SolidError::Index { face: i / 3, index: indices[i], count });
         }
+        let mut named = vec![false; count];
+        indices.iter().for_each(|&index| named[index as usize] = true);
         let (mut low, mut high, mut nothing) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3], [0.0; 3]);
         let grow = |vertex: &[f64; 3]| {
             for (axis, &v) in vertex.iter().enumerate() {
@@ -111,9 +116,33 @@ impl Frame {
 
     /// The vertices in the grid, their axes in the given order: columns run along the last of them.
     fn place(&self, vertices: &[[f64; 3]], axes: [usize; 3]) -> Vec<Point> {
+        placed(self, vertices, axes)
+    }
+}
+
+for_each_instruction_set! {
+    fn largest(indices: &[i64]) -> u64 {
+        let mut largest = 0;
+        for &index in indices {
+            largest = largest.max(index as u64);
+        }
+        largest
+    }
+}
+
+for_each_instruction_set! {
+    fn placed(frame: &Frame, vertices: &[[f64; 3]], axes: [usize; 3]) -> Vec<Point> {
         let half = f64::from(ONE) * (SIDE / 2) as f64;
-        let place = |v: &[f64; 3]| point(axes.map(|a| (v[a] - self.middle[a]) * self.scale + half));
-        vertices.iter().map(place).collect()
+        let middle = axes.map(|a| frame.middle[a]);
+        let mut points = vec![Point::default(); vertices.len()];
+        for (point, vertex) in points.iter_mut().zip(vertices) {
+            let mut place = [0.0; 3];
+            for (k, &a) in axes.iter().enumerate() {
+                place[k] = (vertex[a] - middle[k]) * frame.scale + half;
+            }
+            *point = crossings::point(place);
+        }
+        points
     }
 }
 
