@@ -146,7 +146,7 @@ pub struct Slot<'a> {
 const SHAPE: u64 = 0;
 const CAMERAS: u64 = 1;
 const PEN: u64 = 2;
-const FREE: u64 = 64;
+const FREE: u64 = 16;
 
 /// Makes sample `index`, of as many views as `slot` has room for.
 pub fn sample(
