@@ -4,7 +4,7 @@ import zlib
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 from skimage.morphology import skeletonize
@@ -26,7 +26,7 @@ def box(size=400, pen=3.0, scale=1.0, shift=(0.0, 0.0)):
     image = Image.new("L", (size * fine, size * fine), 255)
     brush = ImageDraw.Draw(image)
     points = (((np.array(CORNERS) - 0.5) * scale + 0.5) + shift) * size * fine
-    radius = (pen * fine - 1) / 2
+    radius = max(0.0, (pen * fine - 1) / 2)
     for a, b in EDGES:
         brush.line([*points[a], *points[b]], fill=0, width=max(1, round(pen * fine)))
     for x, y in points:
@@ -178,6 +178,7 @@ def test_thick_dark_drawing_of_256_is_thinned():
 
 @settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.integers(100, 2000), st.floats(0, 1), st.booleans())
+@example(1201, 0.0, False)
 def test_line_width(size, thickness, dark):
     pen = 0.8 + thickness * (0.03 * size - 0.8)
     assume(size != 256)  # clean ones of that size pass as they are
