@@ -63,18 +63,17 @@ seen = []
 def progress(finished):
     if not seen:
         print("begun", flush=True)
-    seen.append((finished, time.monotonic()))
+    seen.append(finished)
 
 try:
     generate(4, 4000, config={"frustum_rays": 4}, threads=2, progress=progress)
 except KeyboardInterrupt:
-    late = time.monotonic() - seen[-1][1]
     used = time.process_time()
     time.sleep(0.5)
     used = time.process_time() - used
     world = generate(4, 2, threads=2).world
     np.testing.assert_array_equal(world, generate(4, 2, threads=1).world)
-    print(seen[-1][0], late, used)
+    print(seen[-1], used)
 """
 
 
@@ -84,10 +83,8 @@ def test_ctrl_c_stops_a_batch_and_its_threads():
     process.send_signal(signal.SIGINT)
     said, complaints = process.communicate(timeout=60)
     assert process.returncode == 0, complaints
-    finished, late, used = map(float, said.split())
+    finished, used = map(float, said.split())
     assert finished < 2000
-    # From the last tick before the signal: a tick of 50 ms and a few samples. A machine under load needs longer.
-    assert late < 2
     assert used < 0.1, "no thread works on"
 
 
