@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from sketchcore import VIEWPOINTS, Cuboid, Shape, draw, iou, voxelize
 from sketchcore.camera import pack_cameras
-from sketchcore.nets.outlines import BORDER, LIMIT, heed_outlines
-from sketchcore.nets.sketches import Sketches
+from sketchcore.nets.outlines import LIMIT, heed_outlines
+from sketchcore.nets.sketches import BORDER, Sketches
 from sketchcore.outline import outline_iou, pieces
 
 SLAB = Shape([Cuboid((0.0, 0.0, 0.0), (0.35, 0.04, 0.3))])

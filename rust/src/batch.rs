@@ -50,7 +50,7 @@ pub struct FreeConfig {
     pub share: f64,
     /// Degrees above the horizon, least and most.
     pub elevation: [f64; 2],
-    /// Field of view in degrees, least and most; its distance is such that the world appears as large as ever.
+    /// Field of view in degrees, least and most; a ball around the world fills the image at any of them.
     pub fov: [f64; 2],
 }
 

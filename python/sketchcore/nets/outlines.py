@@ -8,17 +8,14 @@ still say where along the ray the solid is most likely, so that is where it is r
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from sketchcore import _core
-from sketchcore.nets.sketches import Sketches
+from sketchcore.nets.sketches import BORDER, Sketches
+from sketchcore.rounds import Volume
 
-Volume = NDArray[np.float32]
-
-BORDER = 128
-"""The signed distance of an outline, in `Sketches.fields` and `Sketches.evidence`; 8 a pixel more inside."""
 PIXEL = 8
+"""What a signed distance grows by in one pixel."""
 MARGIN = 0.4
 """How far beyond 0 the logits are moved, for the surface is interpolated between voxels."""
 LIMIT = 2.0
@@ -41,8 +38,7 @@ def heed_outlines(volume: Volume, sketches: Sketches) -> Volume:
     known = np.clip(volume, least, 1 - least)
     logits = np.log(known / (1 - known))
     missing = np.zeros_like(logits)
-    for field, camera in zip(sketches.fields, sketches.cameras, strict=True):
-        inside = field[:, :, 0].reshape(64, 4, 64, 4).min(axis=(1, 3)) >= BORDER
+    for inside, camera in zip(sketches.interiors, sketches.cameras, strict=True):
         # Zero is what lies outside the grid: there is nothing.
         along = _core.to_camera_grid(logits[None] + np.float32(FAR), camera[None])[0].max(axis=0) - np.float32(FAR)
         lack = gaussian_filter(np.clip(MARGIN - along, 0, LIMIT) * inside, 0.7)

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from sketchcore import _core
 
+BORDER = 128
+"""The signed distance of an outline, in `Sketches.fields` and `Sketches.evidence`; 8 a pixel more inside."""
+
 
 @dataclass(frozen=True)
 class Sketches:
@@ -30,6 +33,13 @@ class Sketches:
     def fields(self) -> NDArray[np.uint8]:
         """uint8 [n, 256, 256, 2]: silhouette and nearness to ink (`rust/src/evidence.rs`)."""
         return _core.evidence_fields(self.drawings)
+
+    @cached_property
+    def interiors(self) -> NDArray[np.bool_]:
+        """The cells of a camera grid that lie wholly inside each drawing's outline, bool [n, 64, 64] (row, col)."""
+        silhouettes = self.fields[..., 0].reshape(-1, 64, 4, 64, 4)
+        inside: NDArray[np.bool_] = silhouettes.min(axis=(2, 4)) >= BORDER
+        return inside
 
     @cached_property
     def evidence(self) -> NDArray[np.uint8]:

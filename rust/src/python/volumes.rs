@@ -16,10 +16,7 @@ pub fn voxelize<'py>(
     out: Option<Bound<'py, PyArrayDyn<u8>>>,
 ) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
     let shape = shape_of(&shape)?;
-    filled(py, out, &[SIDE; 3], |voxels| {
-        BitGrid::of_shape(&shape).write_bytes(voxels);
-        Ok::<_, PyErr>(())
-    })
+    voxels(py, out, || Ok(BitGrid::of_shape(&shape)))
 }
 
 #[pyfunction]
@@ -32,8 +29,17 @@ pub fn voxelize_mesh<'py>(
 ) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
     let vertices = checked(&vertices, "vertices", &[-1, 3])?.as_chunks::<3>().0;
     let faces = checked(&faces, "faces", &[-1, 3])?.as_chunks::<3>().0;
-    filled(py, out, &[SIDE; 3], |voxels| {
-        solid::voxelize(vertices, faces)?.write_bytes(voxels);
+    voxels(py, out, || Ok(solid::voxelize(vertices, faces)?))
+}
+
+/// A solid's voxels as bytes, in `out` or a fresh array.
+fn voxels<'py>(
+    py: Python<'py>,
+    out: Option<Bound<'py, PyArrayDyn<u8>>>,
+    solid: impl FnOnce() -> PyResult<BitGrid> + Send,
+) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
+    filled(py, out, &[SIDE; 3], |bytes| {
+        solid()?.write_bytes(bytes);
         Ok::<_, PyErr>(())
     })
 }
