@@ -18,6 +18,7 @@
 //! them, and a vase of a single wall is full. A sheet that encloses nothing has no inside, and leaves no voxels.
 
 mod crossings;
+mod faces;
 
 use crate::dispatch::for_each_instruction_set;
 use crate::voxel::{BitGrid, SIDE};
@@ -88,21 +89,13 @@ impl Frame {
         }
         let mut named = vec![false; count];
         indices.iter().for_each(|&index| named[index as usize] = true);
-        let (mut low, mut high, mut nothing) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3], [0.0; 3]);
-        let grow = |vertex: &[f64; 3]| {
-            for (axis, &v) in vertex.iter().enumerate() {
-                low[axis] = if v < low[axis] { v } else { low[axis] };
-                high[axis] = if v > high[axis] { v } else { high[axis] };
-                nothing[axis] += v * 0.0; // NaN, if v is not finite
-            }
-        };
         let used = |i: &usize| named[*i];
-        if named.iter().all(|&n| n) {
-            vertices.iter().for_each(grow);
+        let (low, high, finite) = if named.iter().all(|&n| n) {
+            bounds(vertices)
         } else {
-            (0..count).filter(used).map(|i| &vertices[i]).for_each(grow);
-        }
-        if nothing != [0.0; 3] {
+            bounds(&(0..count).filter(used).map(|i| vertices[i]).collect::<Vec<_>>())
+        };
+        if !finite {
             let bad = (0..count).filter(used).find(|&i| vertices[i].iter().any(|v| !v.is_finite()));
             return Err(SolidError::Vertex(bad.unwrap_or(0)));
         }
@@ -127,6 +120,28 @@ for_each_instruction_set! {
             largest = largest.max(index as u64);
         }
         largest
+    }
+}
+
+for_each_instruction_set! {
+    /// The least and the largest coordinate along each axis, and whether all are finite.
+    fn bounds(vertices: &[[f64; 3]]) -> ([f64; 3], [f64; 3], bool) {
+        // Eight vertices side by side are three whole vectors.
+        let (eights, rest) = vertices.as_flattened().as_chunks::<24>();
+        let (mut low, mut high, mut nothing) = ([f64::INFINITY; 24], [f64::NEG_INFINITY; 24], [0.0; 24]);
+        let mut grow = |i: usize, v: f64| {
+            low[i] = if v < low[i] { v } else { low[i] };
+            high[i] = if v > high[i] { v } else { high[i] };
+            nothing[i] += v * 0.0; // NaN, if v is not finite
+        };
+        for eight in eights {
+            eight.iter().enumerate().for_each(|(i, &v)| grow(i, v));
+        }
+        rest.iter().enumerate().for_each(|(i, &v)| grow(i, v));
+        let along = |all: [f64; 24], first: f64, pick: fn(f64, f64) -> f64| {
+            [0, 1, 2].map(|axis| all.iter().skip(axis).step_by(3).fold(first, |one, &v| pick(one, v)))
+        };
+        (along(low, f64::INFINITY, f64::min), along(high, f64::NEG_INFINITY, f64::max), nothing == [0.0; 24])
     }
 }
 

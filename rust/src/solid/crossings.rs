@@ -4,19 +4,17 @@
 //! that meets an edge or a vertex counts as one that passes a hair towards +x, and by a hair of that hair towards +y:
 //! every edge gives it to one of its two faces, whichever way round they are. No ray slips through a closed surface.
 
+use super::faces::{ALONE, FACES, Faces, PATCH};
 use crate::dispatch::for_each_instruction_set;
 use crate::voxel::SIDE;
 
 /// Columns of a grid; column `i * 64 + j` lies at i along the first axis, j along the second.
 pub const COLUMNS: usize = SIDE * SIDE;
 /// A voxel's side.
-pub const ONE: i32 = 1 << FRACTION;
-const FRACTION: u32 = 20;
-const HALF: i32 = ONE / 2;
+pub const ONE: i32 = 1 << 20;
+pub const HALF: i32 = ONE / 2;
 /// Added to a small number, leaves the nearest integer in the low bits of the sum.
-const ROUND: f64 = 6_755_399_441_055_744.0;
-/// Faces that are looked through at a time for those that meet a ray.
-const CHUNK: usize = 512;
+pub const ROUND: f64 = 6_755_399_441_055_744.0;
 
 /// A vertex: x, y, z, and a random number of its own.
 pub type Point = [i32; 4];
@@ -48,11 +46,27 @@ pub struct Vote {
     pub outside: u64,
 }
 
+impl Default for Crossings {
+    fn default() -> Self {
+        Self { first: [[0; 2]; COLUMNS], higher: Vec::new(), boundary: 0 }
+    }
+}
+
 impl Crossings {
     pub fn of(points: &[Point], faces: &[[i64; 3]]) -> Self {
-        let mut crossings = Self { first: [[0; 2]; COLUMNS], higher: Vec::new(), boundary: 0 };
+        let mut crossings = Self::default();
         add_faces(&mut crossings, points, faces);
         crossings
+    }
+
+    /// Adds all faces; compiled for the plain architecture where it is called from elsewhere than [`Self::of`].
+    #[inline(always)]
+    pub fn add(&mut self, points: &[Point], faces: &[[i64; 3]]) {
+        let mut prepared = Faces::default();
+        for some in faces.chunks(FACES) {
+            self.boundary = self.boundary.wrapping_add(prepared.prepare(points, some));
+            (0..some.len()).for_each(|face| self.add_face(&prepared, face));
+        }
     }
 
     /// Whether every edge is run along as often in one direction as in the other: then the mesh is a closed surface,
@@ -103,54 +117,30 @@ impl Crossings {
 
     /// Adds one to the crossings above a face, in every column whose ray it meets.
     #[inline(always)]
-    fn add_face(&mut self, a: Point, mut b: Point, mut c: Point) {
-        let [(x0, x1), (y0, y1)] = columns(a, b, c);
-        let along = |p: Point, q: Point, axis: usize| i64::from(q[axis] - p[axis]);
-        // Twice the area as seen from above, more than 0 where the face's outside is.
-        let mut area = along(a, b, 0) * along(a, c, 1) - along(a, b, 1) * along(a, c, 0);
-        if area == 0 {
+    fn add_face(&mut self, faces: &Faces, face: usize) {
+        let mut met = faces.met[face];
+        if met == ALONE {
+            faces.each_ray(face, |i, j| self.add_ray(faces, face, i, j));
             return;
         }
-        let side = usize::from(area > 0);
-        if area < 0 {
-            std::mem::swap(&mut b, &mut c);
-            area = -area;
+        while met != 0 {
+            let ray = met.trailing_zeros() as usize % (PATCH * PATCH);
+            self.add_ray(faces, face, ray / PATCH, ray % PATCH);
+            met &= met - 1;
         }
-        let at = [x0, y0].map(|i| i * ONE + HALF);
-        let edges = [Edge::of(b, c, at), Edge::of(c, a, at), Edge::of(a, b, at)];
-        // The height of the plane above the rays, in voxels, is affine in their place.
-        let [rise_b, rise_c] = [along(a, b, 2), along(a, c, 2)];
-        let slope_x = (along(a, c, 1) * rise_b - along(a, b, 1) * rise_c) as f64 / area as f64;
-        let slope_y = (along(a, b, 0) * rise_c - along(a, c, 0) * rise_b) as f64 / area as f64;
-        let [from_x, from_y] = [0, 1].map(|axis| f64::from(at[axis] - a[axis]));
-        let mut row_height = (f64::from(a[2] - HALF) + slope_x * from_x + slope_y * from_y) / f64::from(ONE);
-        // Rounding leaves less than a thousandth of this.
-        let unsure = 1e-10 * (1.0 + slope_x.abs() + slope_y.abs());
-        let mut row = edges.map(|edge| edge.margin);
-        for i in x0..=x1 {
-            let (mut margins, mut height) = (row, row_height);
-            for j in y0..=y1 {
-                if margins[0] | margins[1] | margins[2] >= 0 {
-                    let rounded = height + ROUND;
-                    let over = height - (rounded - ROUND);
-                    let mut first = rounded.to_bits() as u32 + u32::from(over > 0.0);
-                    if over.abs() < unsure {
-                        let shares = [margins[1] - edges[1].tie, margins[2] - edges[2].tie];
-                        first = first_above(shares, [rise_b, rise_c], a[2], area);
-                    }
-                    self.add(i as usize * SIDE + j as usize, side, u64::MAX << (first % SIDE as u32));
-                }
-                (0..3).for_each(|e| margins[e] += edges[e].step_y);
-                height += slope_y;
-            }
-            (0..3).for_each(|e| row[e] += edges[e].step_x);
-            row_height += slope_x;
-        }
+    }
+
+    /// Adds one to the crossings above a face in one column, counted from the face's first.
+    #[inline(always)]
+    fn add_ray(&mut self, faces: &Faces, face: usize, i: usize, j: usize) {
+        let [i0, j0] = faces.first.each_ref().map(|first| first[face] as usize);
+        let above = u64::MAX << (faces.first_above(face, i, j) % SIDE as u32);
+        self.add_above((i0 + i) * SIDE + j0 + j, usize::from(faces.area[face] > 0), above);
     }
 
     /// Adds one to the crossings of some voxels of a column.
     #[inline(always)]
-    fn add(&mut self, column: usize, side: usize, voxels: u64) {
+    fn add_above(&mut self, column: usize, side: usize, voxels: u64) {
         let digit = &mut self.first[column % COLUMNS][side];
         let carry = *digit & voxels;
         *digit ^= voxels;
@@ -177,74 +167,10 @@ impl Crossings {
 
 for_each_instruction_set! {
     fn add_faces(crossings: &mut Crossings, points: &[Point], faces: &[[i64; 3]]) {
-        let corners = |face: &[i64; 3]| face.map(|i| points[i as usize]);
-        let mut kept = [0; CHUNK];
-        for faces in faces.chunks(CHUNK) {
-            let mut count = 0;
-            for (i, face) in faces.iter().enumerate() {
-                let [a, b, c] = corners(face);
-                crossings.boundary = crossings.boundary.wrapping_add(boundary([a, b, c].map(|p| p[3])));
-                let [x, y] = columns(a, b, c);
-                kept[count] = i;
-                count += usize::from((x.0 <= x.1) & (y.0 <= y.1));
-            }
-            for &i in &kept[..count] {
-                let [a, b, c] = corners(&faces[i]);
-                crossings.add_face(a, b, c);
-            }
-        }
+        crossings.add(points, faces);
     }
 }
 
 fn differing([up, down]: &[u64; 2]) -> u64 {
     up ^ down
-}
-
-/// One edge of a face that is seen anticlockwise.
-#[derive(Clone, Copy)]
-struct Edge {
-    /// How far the first ray lies within the edge, times its length; less than 0 outside. On the edge it is 0 if
-    /// the edge keeps its rays, else -1.
-    margin: i64,
-    /// What is in the margin because of that.
-    tie: i64,
-    /// How the margin grows from ray to ray.
-    step_x: i64,
-    step_y: i64,
-}
-
-impl Edge {
-    #[inline(always)]
-    fn of(p: Point, q: Point, at: [i32; 2]) -> Self {
-        let [dx, dy] = [0, 1].map(|axis| i64::from(q[axis] - p[axis]));
-        let [x, y] = [0, 1].map(|axis| i64::from(at[axis] - p[axis]));
-        let keeps = dy < 0 || dy == 0 && dx > 0;
-        let tie = i64::from(keeps) - 1;
-        Self { margin: dx * y - dy * x + tie, tie, step_x: -dy << FRACTION, step_y: dx << FRACTION }
-    }
-}
-
-/// The columns whose rays pass the bounding box of a face: first and last along either axis.
-#[inline(always)]
-fn columns(a: Point, b: Point, c: Point) -> [(i32, i32); 2] {
-    [0, 1].map(|axis| {
-        let (low, high) = (a[axis].min(b[axis]).min(c[axis]), a[axis].max(b[axis]).max(c[axis]));
-        ((low + (HALF - 1)) >> FRACTION, (high - HALF) >> FRACTION)
-    })
-}
-
-#[inline(always)]
-fn boundary(numbers: [i32; 3]) -> i64 {
-    let [p, q, r] = numbers.map(i64::from);
-    (p - q).wrapping_mul(q - r).wrapping_mul(r - p)
-}
-
-/// The first voxel of a column whose centre is not below a face, exactly. `shares` are the areas that b and c have of
-/// the face where the ray meets it, `rises` their heights above a.
-#[cold]
-fn first_above(shares: [i64; 2], rises: [i64; 2], a: i32, area: i64) -> u32 {
-    let [shares, rises] = [shares, rises].map(|pair| pair.map(i128::from));
-    let area = i128::from(area);
-    let height = shares[0] * rises[0] + shares[1] * rises[1] + i128::from(a - HALF) * area;
-    -(-height).div_euclid(area << FRACTION) as u32
 }

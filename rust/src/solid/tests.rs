@@ -85,6 +85,24 @@ proptest! {
     }
 
     #[test]
+    fn every_instruction_set_counts_the_same(
+        vertices in prop::collection::vec([coordinate(), coordinate(), coordinate()], 3..40), more in 1..8_i64
+    ) {
+        // A soup of faces, large and small, on a lattice that meets rays and voxels' centres.
+        let n = vertices.len() as i64;
+        let faces: Vec<_> = (0..3 * n).map(|i| [i % n, (i * more + 1) % n, (i / 2 + more) % n]).collect();
+        let points = Frame { middle: [0.0; 3], scale: SIDE as f64 * f64::from(ONE) }.place(&vertices, AXES[2]);
+        let mut plain = Crossings::default();
+        plain.add(&points, &faces);
+        let chosen = Crossings::of(&points, &faces);
+        prop_assert_eq!(chosen.winding(), plain.winding());
+        prop_assert_eq!(chosen.closed(), plain.closed());
+        for column in 0..COLUMNS {
+            prop_assert_eq!(chosen.winding_both_ways(column, 31), plain.winding_both_ways(column, 31));
+        }
+    }
+
+    #[test]
     fn faces_may_be_turned_over_and_come_twice(
         mesh in any_cuboid(), turned in prop::collection::vec(any::<bool>(), 12), twice in 0..12_usize
     ) {
