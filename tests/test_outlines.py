@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, binary_erosion
 
 from sketchcore import VIEWPOINTS, Cuboid, Shape, draw, iou, voxelize
 from sketchcore.camera import pack_cameras
@@ -40,6 +41,17 @@ def test_a_slab_that_nobody_dared_to_fill_is_filled_where_it_is_most_likely(view
     for camera in TWO[:views]:
         drawing = draw(SLAB, camera)
         assert outline_iou(filled, camera, drawing) > 0.94 > 0.8 > outline_iou(doubtful, camera, drawing)
+
+
+def test_a_surface_that_stands_back_from_its_outline_is_brought_to_it():
+    truth = voxelize(SLAB).astype(bool)
+    core = binary_erosion(truth)
+    timid = np.where(core, 0.95, np.where(truth, 0.3, 0.02)).astype(np.float32)
+    sketches = sketches_of(SLAB, 1)
+    before, after = (outline_iou(v, TWO[0], sketches.drawings[0]) for v in (timid, heed_outlines(timid, sketches)))
+    assert after > 0.89 > 0.85 > before, "the solid itself has 0.97"
+    beyond = heed_outlines(timid, sketches) > 0.5
+    assert not beyond[~binary_dilation(truth)].any(), "not past it"
 
 
 def test_what_no_outline_holds_is_cleared_where_the_network_hardly_believes_in_it():

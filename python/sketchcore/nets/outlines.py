@@ -11,13 +11,17 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from sketchcore import _core
-from sketchcore.nets.sketches import BORDER, Sketches
+from sketchcore.nets.sketches import BORDER, PIXEL, Sketches
 from sketchcore.rounds import Volume
 
-PIXEL = 8
-"""What a signed distance grows by in one pixel."""
 MARGIN = 0.4
 """How far beyond 0 the logits are moved, for the surface is interpolated between voxels."""
+SLOPE = 0.6
+"""What a logit should grow by in one pixel inside the outline, up to the margin: so that the surface ends at it."""
+STROKE = 0.5
+"""How far inside the ink's outer border the outline is, in pixels: lines are drawn about it."""
+BLUR = 0.5
+"""Cells over which what is missing is spread, since drawings err."""
 LIMIT = 2.0
 """The most that a logit is moved: drawings err, and networks may know better."""
 FAR = 12.0
@@ -38,10 +42,11 @@ def heed_outlines(volume: Volume, sketches: Sketches) -> Volume:
     known = np.clip(volume, least, 1 - least)
     logits = np.log(known / (1 - known))
     missing = np.zeros_like(logits)
-    for inside, camera in zip(sketches.interiors, sketches.cameras, strict=True):
+    for pixels, camera in zip(sketches.depths, sketches.cameras, strict=True):
         # Zero is what lies outside the grid: there is nothing.
         along = _core.to_camera_grid(logits[None] + np.float32(FAR), camera[None])[0].max(axis=0) - np.float32(FAR)
-        lack = gaussian_filter(np.clip(MARGIN - along, 0, LIMIT) * inside, 0.7)
+        asked = np.minimum(SLOPE * (pixels - STROKE), MARGIN)
+        lack = gaussian_filter(np.clip(asked - along, 0, LIMIT) * (pixels > 0), BLUR)
         each = np.zeros_like(logits)
         spread = np.ascontiguousarray(np.broadcast_to(lack, (1, 64, 64, 64)))
         _core.to_world_grid(spread, camera[None], each[None])

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from sketchcore import _core
 
 BORDER = 128
-"""The signed distance of an outline, in `Sketches.fields` and `Sketches.evidence`; 8 a pixel more inside."""
+"""The signed distance of an outline, in `Sketches.fields` and `Sketches.evidence`."""
+PIXEL = 8
+"""What that distance grows by in one pixel, inwards."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +37,11 @@ class Sketches:
         return _core.evidence_fields(self.drawings)
 
     @cached_property
-    def interiors(self) -> NDArray[np.bool_]:
-        """The cells of a camera grid that lie wholly inside each drawing's outline, bool [n, 64, 64] (row, col)."""
+    def depths(self) -> NDArray[np.float32]:
+        """How far each cell of a camera grid lies inside each drawing's outline: pixels, float32 [n, 64, 64] (row, col)."""
         silhouettes = self.fields[..., 0].reshape(-1, 64, 4, 64, 4)
-        inside: NDArray[np.bool_] = silhouettes.min(axis=(2, 4)) >= BORDER
-        return inside
+        mean: NDArray[np.float32] = silhouettes.mean(axis=(2, 4), dtype=np.float32)
+        return (mean - BORDER) / PIXEL
 
     @cached_property
     def evidence(self) -> NDArray[np.uint8]:
