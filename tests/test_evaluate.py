@@ -26,6 +26,9 @@ class Oracle:
     def __init__(self, examples: list[Example]) -> None:
         self.truth = {camera.packed.tobytes(): e.frustum(i) for e in examples for i, camera in enumerate(e.cameras)}
 
+    def first_prediction(self, sketches: Sketches) -> Volume:
+        return next(self.rounds(sketches, 0))
+
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         blank = np.full((64, 64, 64), 0.1, np.float32)
         return update_rounds(

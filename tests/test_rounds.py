@@ -13,7 +13,7 @@ import sketchcore as sk
 from sketchcore.camera import pack_cameras
 from sketchcore.nets.sketches import Sketches
 from sketchcore.rounds import Volume, update_rounds, visit
-from sketchcore.viewpoint import guess_viewpoint
+from sketchcore.viewpoint import guess_camera, guess_viewpoint
 
 VIEWS = ["quarter-037", "front", "top"]
 SHAPE = sk.Shape([sk.Cuboid((0, -0.1, 0), (0.3, 0.2, 0.2)), sk.Cylinder((0.1, 0.15, 0), (0.1, 0.1, 0.1))])
@@ -35,6 +35,9 @@ class Oracle:
     """Knows the true camera grid of a drawing that was made from its camera; is unsure of any other."""
 
     device = torch.device("cpu")
+
+    def first_prediction(self, sketches: Sketches) -> Volume:
+        return next(self.rounds(sketches, 0))
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         return update_rounds(lambda view, prior: self.answer(sketches, view), sketches.cameras, iterations, start)
@@ -95,3 +98,15 @@ def test_an_oracle_reaches_the_ceiling_of_the_grid() -> None:
 def test_the_viewpoint_of_an_oracle_is_found() -> None:
     for name in sk.QUARTER_VIEWS:
         assert guess_viewpoint(Oracle(), sk.draw(SHAPE, sk.VIEWPOINTS[name]))[0] == name
+
+
+@pytest.mark.parametrize("view", sk.QUARTER_VIEWS[::3])
+def test_a_drawing_from_a_viewpoint_is_left_there(view: str) -> None:
+    camera = sk.VIEWPOINTS[view]
+    assert guess_camera(Oracle(), sk.draw(SHAPE, camera)) == (view, camera)
+
+
+def test_a_drawing_from_beside_a_viewpoint_is_traced_to_its_camera() -> None:
+    azimuth = np.degrees(np.arctan2(*sk.VIEWPOINTS["quarter-307"].position[[2, 0]]))
+    camera = sk.Camera.orbit(azimuth - 10, 22, fov_degrees=30)
+    assert guess_camera(Oracle(), sk.draw(SHAPE, camera)) == ("quarter-307", camera)

@@ -26,6 +26,11 @@ def _frozen_array(value: ArrayLike, shape: tuple[int, ...], name: str) -> NDArra
     return array
 
 
+def _half_sine(fov_degrees: float) -> float:
+    # A field of view that is none is refused by `Camera` itself.
+    return math.sin(math.radians(fov_degrees / 2)) if 0 < fov_degrees < 180 else 1.0
+
+
 @dataclass(frozen=True, eq=False)
 class Camera:
     """A pinhole camera with a square image; axes x right, y down, z forward (OpenCV).
@@ -85,24 +90,33 @@ class Camera:
         return cls(row[:3], row[3:12].reshape(3, 3), float(row[12]), float(row[13]), float(row[14]))
 
     @classmethod
-    def orbit(cls, azimuth: float, elevation: float, distance: float = DISTANCE) -> Camera:
-        """A camera that looks at the origin from a distance.
+    def orbit(
+        cls, azimuth: float, elevation: float, distance: float | None = None, *, fov_degrees: float = FOV_DEGREES
+    ) -> Camera:
+        """A camera that looks at the origin; its near and far planes stand 0.75 before and behind it.
 
         Args:
             azimuth: degrees from +x towards +z.
             elevation: degrees above the horizon; at 90 the image's right is +x and its top -z.
-            distance: world units from the origin, more than 0.
+            distance: world units from the origin, more than 0; None for one from which a ball around the origin fills
+                as much of the image as it does from 2.0 with a field of view of 45 degrees. Nearer than 0.79 the near
+                plane stands at a twentieth of it.
+            fov_degrees: field of view in degrees.
         """
+        if distance is None:
+            distance = DISTANCE * _half_sine(FOV_DEGREES) / _half_sine(fov_degrees)
         if distance <= 0:
             raise ValueError(f"camera distance must be more than 0, got {distance}")
+        planes = max(distance - DISTANCE + NEAR, distance / 20), distance - DISTANCE + FAR
         if elevation == 90.0:
-            return cls(np.array([0.0, distance, 0.0]), np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]))
+            axes = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+            return cls(np.array([0.0, distance, 0.0]), axes, fov_degrees, *planes)
         a, e = math.radians(azimuth), math.radians(elevation)
         position = np.array([math.cos(e) * math.cos(a), math.sin(e), math.cos(e) * math.sin(a)])
         forward = -position
         right = np.array([math.sin(a), 0.0, -math.cos(a)])
         down = np.cross(forward, right)
-        return cls(distance * position, np.stack([right, down, forward]))
+        return cls(distance * position, np.stack([right, down, forward]), fov_degrees, *planes)
 
 
 def pack_cameras(cameras: Iterable[Camera]) -> NDArray[np.float64]:

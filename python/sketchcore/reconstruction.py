@@ -14,14 +14,14 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from sketchcore.camera import VIEWPOINTS, Camera, as_camera, pack_cameras
+from sketchcore.camera import Camera, as_camera, pack_cameras
 from sketchcore.drawing import load_drawing
 from sketchcore.mesh import MESH_SUFFIXES, extract_mesh, save_mesh
 from sketchcore.nets.models import CompactModel, Model, PaperModel, build_model
 from sketchcore.nets.sketches import Sketches
 from sketchcore.nets.weights import load_weights
 from sketchcore.rounds import Volume
-from sketchcore.viewpoint import guess_viewpoint
+from sketchcore.viewpoint import guess_camera
 from sketchcore.volume import load_binvox, load_npz, save_binvox, save_npz
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class Reconstruction:
         views: the camera of each drawing.
         trace: root-mean-square change of the probability in each round.
         drawings: uint8 [n, 256, 256], the drawings as the network saw them, ink 255 on 0.
-        guessed: the viewpoint's name, where it was not given.
+        guessed: the name of the viewpoint that is nearest to the camera, where none was given.
     """
 
     probability: Volume
@@ -160,7 +160,8 @@ def reconstruct(
         drawings: one drawing or a sequence of them; a drawing is a path, a PIL image, or an array [H, W] or
             [H, W, 3 or 4], dark on light or light on dark.
         views: a viewpoint's name (`sketchcore.VIEWPOINTS`) or a `sketchcore.Camera` for each drawing; None, for a
-            single drawing only, guesses among the eight three-quarter views.
+            single drawing only, guesses among the eight three-quarter views, and the cameras near the best of them
+            where its solid fills the outline poorly.
         iterations: rounds over all drawings, 0 or more.
         model: None for the weights inside the package, a path to weights, or a loaded model (`load_model`).
         device: None for CUDA where there is one, else the CPU.
@@ -188,9 +189,10 @@ def reconstruct(
     images = np.stack([load_drawing(source) for source in sources])
     chosen = load_model(model, device)
     guessed = None
+    guessed = None
     if not cameras:
-        guessed = guess_viewpoint(chosen, images[0])[0]
-        cameras = (VIEWPOINTS[guessed],)
+        guessed, camera = guess_camera(chosen, images[0])
+        cameras = (camera,)
     return replace(_run(images, cameras, iterations, chosen, progress), guessed=guessed)
 
 

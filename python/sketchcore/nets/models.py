@@ -28,6 +28,10 @@ class Model(Protocol):
 
     device: torch.device
 
+    def first_prediction(self, sketches: Sketches) -> Volume:
+        """float32 [64, 64, 64] (x, y, z), probability of occupancy as the network says it: with nothing mended yet."""
+        ...
+
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         """Yields float32 [64, 64, 64] (x, y, z), probability of occupancy: the first prediction, then each round's.
 
@@ -53,6 +57,10 @@ class CompactModel:
         self.net = place(net, device).eval()
         self.device = device
 
+    def first_prediction(self, sketches: Sketches) -> Volume:
+        evidence = unit(sketches.evidence[None], self.device)
+        return _whole(self._decide(self._read(sketches), evidence, None, len(sketches), flip=False))
+
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         answers: dict[tuple[int, ...] | None, Tensor] = {}
         mean: Tensor | None = None
@@ -67,7 +75,7 @@ class CompactModel:
                 readings[look] = self._read(reduce(Sketches.mirrored, look, sketches))
             answers[look] = self._decide(readings[look], evidence, mean, len(sketches), flip=0 in look)
             mean = torch.stack([*answers.values()]).mean(dim=0)
-            yield heed_outlines(_array(torch.cat([mean.flip(3), mean], dim=3)[0]), sketches)
+            yield heed_outlines(_whole(mean), sketches)
 
     @torch.inference_mode()
     def _read(self, sketches: Sketches) -> Tensor:
@@ -95,6 +103,9 @@ class PaperModel:
         self.updater = None if updater is None else place(updater, device).eval()
         self.device = device
 
+    def first_prediction(self, sketches: Sketches) -> Volume:
+        return next(self.rounds(sketches, 0))
+
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         return update_rounds(
             lambda view, prior: self.predict(sketches.drawings[view], prior), sketches.cameras, iterations, start
@@ -116,6 +127,11 @@ class PaperModel:
             else:
                 logits = self.updater(image, torch.from_numpy(prior).to(self.device)[None])
         return _array(PaperNet.probability(logits.float())[0])
+
+
+def _whole(half: Tensor) -> Volume:
+    """Both halves of a symmetric volume, from the one with z > 0: [1, 64, 64, 32]."""
+    return _array(torch.cat([half.flip(3), half], dim=3)[0])
 
 
 def _array(tensor: Tensor) -> Volume:
