@@ -38,10 +38,10 @@ class Sketches:
 
     @cached_property
     def depths(self) -> NDArray[np.float32]:
-        """How far each cell of a camera grid lies inside each drawing's outline: pixels, float32 [n, 64, 64] (row, col)."""
+        """How far inside each drawing's outline a cell of a camera grid is: pixels, float32 [n, 64, 64] (row, col)."""
         silhouettes = self.fields[..., 0].reshape(-1, 64, 4, 64, 4)
-        mean: NDArray[np.float32] = silhouettes.mean(axis=(2, 4), dtype=np.float32)
-        return (mean - BORDER) / PIXEL
+        pixels: NDArray[np.float32] = (silhouettes.mean(axis=(2, 4), dtype=np.float32) - BORDER) / np.float32(PIXEL)
+        return pixels
 
     @cached_property
     def evidence(self) -> NDArray[np.uint8]:
