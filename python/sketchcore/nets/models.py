@@ -13,6 +13,7 @@ from torch import Tensor, nn
 
 from sketchcore.nets.compact import CompactConfig, CompactNet, read_inputs
 from sketchcore.nets.outlines import heed_outlines
+from sketchcore.nets.pieces import join_pieces
 from sketchcore.nets.precision import autocast, pick_device, place, unit
 from sketchcore.nets.sketches import Sketches
 from sketchcore.nets.unet import PaperNet
@@ -50,7 +51,8 @@ class CompactModel:
     Mirrored, a world is seen by mirrored cameras in drawings flipped left to right. That describes the same object
     as well: about z = 0 because it is symmetric, along x because a mirrored object is an object too. The network
     answers each of the four descriptions a little differently; the volume is the mean of its latest answers, and
-    each next round's prior. What is handed out has every outline filled besides (`outlines.py`).
+    each next round's prior. What is handed out has every outline filled (`outlines.py`), and its pieces joined
+    (`pieces.py`).
     """
 
     def __init__(self, net: CompactNet, device: torch.device) -> None:
@@ -75,7 +77,7 @@ class CompactModel:
                 readings[look] = self._read(reduce(Sketches.mirrored, look, sketches))
             answers[look] = self._decide(readings[look], evidence, mean, len(sketches), flip=0 in look)
             mean = torch.stack([*answers.values()]).mean(dim=0)
-            yield heed_outlines(_whole(mean), sketches)
+            yield join_pieces(heed_outlines(_whole(mean), sketches))
 
     @torch.inference_mode()
     def _read(self, sketches: Sketches) -> Tensor:
