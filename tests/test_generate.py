@@ -285,6 +285,25 @@ def test_slabs_are_wedges_without_their_right_angle():
     assert cuts > 32
 
 
+def test_chamfered_cuboids_lose_edges_along_one_axis():
+    only = {"cylinders": 0.0, "subtracted": 0.0, "steps": [1, 1], "chamfered": 1.0, "chamfer": [0.5, 0.5]}
+    counts = set()
+    for shape in generate(0, 48, config={"grammar": only}).packed_shapes:
+        cuboid, cuts = shape[0], shape[1:]
+        assert (cuboid[0], cuboid[1]) == (0, 1)
+        assert (cuts[:, 1] == 0).all()
+        assert len({int(kind) // 4 for kind in cuts[:, 0]}) == 1
+        along = int(cuts[0, 0]) // 4 - 1
+        np.testing.assert_allclose(cuts[:, 5 + along], cuboid[5 + along])
+        for axis in {0, 1, 2} - {along}:
+            np.testing.assert_allclose(2 * cuts[:, 5 + axis], cuboid[5 + axis])
+            # From an edge of the cuboid to its middle.
+            np.testing.assert_allclose(np.abs(cuts[:, 2 + axis] - cuboid[2 + axis]), cuts[:, 5 + axis])
+        assert len(np.unique(cuts, axis=0)) == len(cuts)
+        counts.add(len(cuts))
+    assert counts == {1, 2, 4}, "single edges, gables, nuts"
+
+
 def test_fitted_primitives_are_as_wide_as_what_they_stand_on():
     wide = {"cylinders": 0.0, "wedges": 0.5, "subtracted": 0.0, "steps": [2, 2]}
     made = generate(0, 64, config={"grammar": {**wide, "fitted": 1.0}})
@@ -346,6 +365,8 @@ def test_the_default_config_is_complete_and_fresh():
         ({"free": {"elevation": [10, 90]}}, r"elevation \[least, most\] between -85 and 85"),
         ({"free": {"fov": [50, 30]}}, r"free\.fov must be \[least, most\] between 10 and 90"),
         ({"grammar": {"fitted": -1}}, r"grammar\..*fitted.* between 0 and 1"),
+        ({"grammar": {"chamfered": 2}}, r"grammar\..*chamfered.* between 0 and 1"),
+        ({"grammar": {"chamfer": [0.2, 0.7]}}, r"grammar\.chamfer must be"),
         ({"grammar": {"slabs": 1.5}}, r"grammar\..*slabs.* between 0 and 1"),
         ({"grammar": {"slab_thickness": [0.5, 1]}}, r"grammar\.slab_thickness must be"),
         ({"hand": {"azimuth": 60}}, "hand: angles must lie between 0 and 45"),

@@ -26,6 +26,11 @@ pub struct GrammarConfig {
     pub slabs: f64,
     /// Thickness of a slab as a share of its wedge's.
     pub slab_thickness: [f64; 2],
+    /// Share of the added cuboids whose edges along one axis are cut off: a house with its roof, a nut.
+    pub chamfered: f64,
+    /// How much of a side such a cut takes, at most one half; every second one takes that half, so that two of them meet in
+    /// a ridge.
+    pub chamfer: [f64; 2],
     /// Share of subtracted primitives.
     pub subtracted: f64,
     /// Half sizes of the first primitive.
@@ -61,6 +66,8 @@ impl Default for GrammarConfig {
             wedges: 0.0,
             slabs: 0.0,
             slab_thickness: [0.15, 0.5],
+            chamfered: 0.0,
+            chamfer: [0.1, 0.5],
             subtracted: 0.33,
             first_half: [0.1, 0.4],
             half: [0.03, 0.25],
@@ -87,11 +94,13 @@ impl GrammarConfig {
         match self {
             c if !(1..=c.steps[1]).contains(&c.steps[0]) => bad("steps must be [least, most], from 1"),
             c if c.steps[1] > 500 => bad("steps must be at most 500"),
-            c if ![c.cylinders, c.wedges, c.slabs, c.fitted, c.subtracted, c.displaced]
+            c if ![c.cylinders, c.wedges, c.slabs, c.chamfered, c.fitted, c.subtracted, c.displaced]
                 .into_iter()
                 .all(share) =>
             {
-                bad("cylinders, wedges, slabs, fitted, subtracted and displaced are shares between 0 and 1")
+                bad(
+                    "cylinders, wedges, slabs, chamfered, fitted, subtracted and displaced are shares between 0 and 1",
+                )
             }
             c if c.cylinders + c.wedges > 1.0 => bad("cylinders and wedges must be at most 1 together"),
             c if !(range(c.first_half) && range(c.half)) => {
@@ -99,6 +108,9 @@ impl GrammarConfig {
             }
             c if !(range(c.slab_thickness) && c.slab_thickness[1] < 1.0) => {
                 bad("slab_thickness must be [least, most], between 0 and 1")
+            }
+            c if !(range(c.chamfer) && c.chamfer[1] <= 0.5) => {
+                bad("chamfer must be [least, most], more than 0 and at most 0.5")
             }
             c if !(amplitude(c.displacement) && amplitude(c.overlap) && amplitude(c.sink)) => {
                 bad("displacement, overlap and sink must be 0 or more")
@@ -126,7 +138,9 @@ impl GrammarConfig {
     fn grow(&self, random: &mut Random) -> Vec<Primitive> {
         let steps = self.steps[0] + random.below(self.steps[1] - self.steps[0] + 1);
         let mut shape = Vec::new();
-        push_symmetric(&mut shape, self.primitive(self.first_half, true, random));
+        let first = self.primitive(self.first_half, true, random);
+        push_symmetric(&mut shape, first);
+        self.cut_edges(&mut shape, first, random);
         for _ in 1..steps {
             let additive = !random.chance(self.subtracted);
             let mut new = self.primitive(self.half, additive, random);
@@ -141,8 +155,27 @@ impl GrammarConfig {
                 let cut = (added + shape.len()) / 2;
                 shape[cut..].iter_mut().for_each(|wedge| *wedge = beyond_slab(*wedge, thickness));
             }
+            self.cut_edges(&mut shape, new, random);
         }
         shape
+    }
+
+    /// Cuts off edges of some of the added cuboids, along one axis: on one side or on both, mostly in pairs.
+    fn cut_edges(&self, shape: &mut Vec<Primitive>, on: Primitive, random: &mut Random) {
+        let may = self.chamfered > 0.0 && on.additive && on.kind == Kind::Cuboid;
+        if !may || !random.chance(self.chamfered) {
+            return;
+        }
+        let axis = random.below(3);
+        let sides: &[i8] = [&[1, -1][..], &[1], &[-1]][random.below(3)];
+        let ends: &[i8] = if random.chance(0.75) { &[1, -1] } else { &[1] };
+        let size = [(); 2].map(|()| if random.chance(0.5) { 0.5 } else { random.between(self.chamfer) });
+        for (&u, &v) in ends.iter().flat_map(|u| sides.iter().map(move |v| (u, v))) {
+            let edge = edge_of(on, axis, [u, v], size);
+            if !shape.contains(&edge) {
+                push_symmetric(shape, edge);
+            }
+        }
     }
 
     fn primitive(&self, half: [f64; 2], additive: bool, random: &mut Random) -> Primitive {
@@ -223,6 +256,18 @@ fn push_symmetric(shape: &mut Vec<Primitive>, mut new: Primitive) {
     }
 }
 
+/// What to take from a cuboid to cut off the edge along an axis at a corner of its cross-section; `size` is how much of
+/// each side goes.
+fn edge_of(cuboid: Primitive, axis: usize, corner: [i8; 2], size: [f64; 2]) -> Primitive {
+    let mut edge = Primitive { kind: Kind::Wedge { axis, corner }, additive: false, ..cuboid };
+    let (u, v) = cross_axes(axis);
+    for (a, sign, size) in [(u, corner[0], size[0]), (v, corner[1], size[1])] {
+        edge.half[a] *= size;
+        edge.center[a] += f64::from(sign) * (cuboid.half[a] - edge.half[a]);
+    }
+    edge
+}
+
 /// What to take from a wedge so that a slab along its slanted face is left: the wedge shrunk towards its right angle.
 fn beyond_slab(wedge: Primitive, thickness: f64) -> Primitive {
     let Kind::Wedge { axis, corner } = wedge.kind else { return wedge };
@@ -242,7 +287,7 @@ mod tests {
     #[test]
     fn shapes_are_symmetric_connected_and_scaled() {
         let paper = GrammarConfig::default();
-        let wedges = GrammarConfig { wedges: 0.3, slabs: 0.5, fitted: 0.4, ..paper.clone() };
+        let wedges = GrammarConfig { wedges: 0.3, slabs: 0.5, fitted: 0.4, chamfered: 0.5, ..paper.clone() };
         for (config, sample) in (0..200).flat_map(|i| [(&paper, i), (&wedges, i)]) {
             let (shape, grid) = config.draw(&mut Random::new(7, sample, 0)).unwrap();
             assert!(grid.is_connected());
@@ -270,6 +315,7 @@ mod tests {
         assert!(with(|c| c.wedges = 0.7).contains("at most 1 together"));
         assert!(with(|c| c.fitted = 1.1).contains("between 0 and 1"));
         assert!(with(|c| c.slabs = 2.0).contains("between 0 and 1"));
+        assert!(with(|c| c.chamfer = [0.1, 0.6]).contains("at most 0.5"));
         assert!(with(|c| c.slab_thickness = [0.5, 1.0]).contains("slab_thickness"));
         assert!(with(|c| c.cover = f64::NAN).contains("cover"));
         let hopeless = GrammarConfig { min_occupancy: 0.9, attempts: 5, ..GrammarConfig::default() };
@@ -297,6 +343,31 @@ mod tests {
         assert!(gable.contains(DVec3::new(0.0, 0.19, 0.0)) && gable.contains(DVec3::new(0.0, -0.19, 0.28)));
         assert!(!gable.contains(DVec3::new(0.0, 0.19, 0.28)));
     }
+
+    #[test]
+    fn edges_that_are_cut_off_leave_a_gable_or_a_nut() {
+        let half = DVec3::new(0.4, 0.2, 0.3);
+        let cuboid = Primitive { kind: Kind::Cuboid, additive: true, center: DVec3::ZERO, half };
+        let without = |corners: &[[i8; 2]], size| {
+            let cuts = corners.iter().map(|&corner| edge_of(cuboid, 0, corner, size));
+            Shape::new(std::iter::once(cuboid).chain(cuts).collect()).unwrap()
+        };
+        let (u, v) = cross_axes(0);
+        let at = |y: f64, z: f64| DVec3::new(0.39, 0.2 * y, 0.3 * z);
+        let up = |sign: i8| if u == 1 { [1, sign] } else { [sign, 1] };
+        assert!([u, v].contains(&1) && [u, v].contains(&2));
+        let gable = without(&[up(1), up(-1)], [0.5; 2]);
+        assert!(
+            gable.contains(at(0.98, 0.0))
+                && gable.contains(at(-0.1, 0.98))
+                && gable.contains(at(-0.98, 0.98))
+        );
+        assert!(!gable.contains(at(0.52, 0.52)) && gable.contains(at(0.48, 0.48)));
+        let nut = without(&[[1, 1], [1, -1], [-1, 1], [-1, -1]], [0.5; 2]);
+        assert!(nut.contains(at(0.98, 0.0)) && nut.contains(at(0.0, -0.98)));
+        assert!(!nut.contains(at(-0.52, -0.52)) && nut.contains(at(-0.48, 0.48)));
+    }
+
     #[test]
     fn a_slab_keeps_to_its_slanted_face() {
         let half = DVec3::new(0.1, 0.2, 0.3);

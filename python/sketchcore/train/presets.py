@@ -55,7 +55,7 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
             average=0.998,
             clip=1.0,
             generator={
-                "grammar": {"wedges": 0.25, "slabs": 0.3, "fitted": 0.4},
+                "grammar": {"steps": [1, 10], "wedges": 0.2, "slabs": 0.3, "fitted": 0.5, "chamfered": 0.4},
                 "free": {"share": 0.25},
                 "hand": {"share": 0.7},
             },
