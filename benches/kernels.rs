@@ -11,7 +11,7 @@ use _core::grammar::GrammarConfig;
 use _core::lines::{LineConfig, detect};
 use _core::random::Random;
 use _core::resample::{to_camera_grid, to_world_grid};
-use _core::voxel::{BitGrid, CELLS};
+use _core::voxel::{BitGrid, CELLS, SIDE};
 use criterion::{BenchmarkGroup, Criterion, measurement::WallTime};
 use rayon::ThreadPool;
 use std::hint::black_box;
@@ -87,8 +87,8 @@ fn volumes(group: &mut Group, shape: &Shape, camera: &Camera) {
     let world: Vec<f32> = bytes.iter().map(|&b| f32::from(b)).collect();
     let (mut seen, mut back) = (vec![0.0; CELLS], vec![0.0; CELLS]);
     let camera = [*camera];
-    group.bench_function("to_camera_grid", |b| b.iter(|| to_camera_grid(&world, &camera, &mut seen)));
-    group.bench_function("to_world_grid", |b| b.iter(|| to_world_grid(&seen, &camera, &mut back)));
+    group.bench_function("to_camera_grid", |b| b.iter(|| to_camera_grid::<SIDE>(&world, &camera, &mut seen)));
+    group.bench_function("to_world_grid", |b| b.iter(|| to_world_grid::<SIDE>(&seen, &camera, &mut back)));
 }
 
 fn drawings(group: &mut Group, shape: &Shape, cameras: &[Camera]) {

@@ -64,9 +64,10 @@ def cameras():
 # --- shapes ------------------------------------------------------------------------------------------------------
 
 
-def voxel_centers():
-    at = (np.arange(SIDE) + 0.5) / SIDE - 0.5
-    return np.stack(np.meshgrid(at, at, at, indexing="ij"), axis=-1)
+def voxel_centers(side=SIDE, step=1):
+    """World positions of a grid's voxels, [side, side, side, 3]; of every so many-th plane alone."""
+    at = (np.arange(side) + 0.5) / side - 0.5
+    return np.stack(np.meshgrid(at[::step], at, at, indexing="ij"), axis=-1)
 
 
 def holds(primitive, points):
@@ -254,10 +255,10 @@ def lines(depth, normal, depth_step=0.006, crease_degrees=30.0, slack=0.0):
 # --- volumes -----------------------------------------------------------------------------------------------------
 
 
-def cell_centers(camera):
-    """World positions of the camera grid's cells, [64, 64, 64, 3] (depth, row, col)."""
-    depths = camera.near + (np.arange(SIDE) + 0.5) / SIDE * (camera.far - camera.near)
-    return camera.position + directions(camera, SIDE)[None] * depths[:, None, None, None]
+def cell_centers(camera, side=SIDE, step=1):
+    """World positions of a camera grid's cells, [side, side, side, 3] (depth, row, col); of every so many-th slice."""
+    depths = camera.near + (np.arange(side) + 0.5)[::step] / side * (camera.far - camera.near)
+    return camera.position + directions(camera, side)[None] * depths[:, None, None, None]
 
 
 def _trilinear(volume, at):
@@ -266,19 +267,22 @@ def _trilinear(volume, at):
     return ndimage.map_coordinates(volume, np.moveaxis(at, -1, 0), order=1, mode="grid-constant", cval=0.0)
 
 
-def to_camera_grid(volume, camera):
-    return _trilinear(volume, (cell_centers(camera) + 0.5) * SIDE - 0.5)
+def to_camera_grid(volume, camera, step=1):
+    """Every so many-th slice of the camera grid."""
+    side = len(volume)
+    return _trilinear(volume, (cell_centers(camera, side, step) + 0.5) * side - 0.5)
 
 
-def to_world_grid(volume, camera, into):
-    """Resampled, and how far each voxel lies from the planes of the frustum's border, in cells."""
-    p = (voxel_centers() - camera.position) @ camera.rotation.T
+def to_world_grid(volume, camera, into, step=1):
+    """Every so many-th plane resampled, and how far its voxels lie from the frustum's border, in cells."""
+    side = len(volume)
+    p = (voxel_centers(side, step) - camera.position) @ camera.rotation.T
     half = np.tan(np.radians(camera.fov_degrees) / 2)
-    slice_ = (p[..., 2] - camera.near) / (camera.far - camera.near) * SIDE
-    row, col = ((p[..., a] / (p[..., 2] * half) + 1) / 2 * SIDE for a in (1, 0))
+    slice_ = (p[..., 2] - camera.near) / (camera.far - camera.near) * side
+    row, col = ((p[..., a] / (p[..., 2] * half) + 1) / 2 * side for a in (1, 0))
     at = np.stack([slice_, row, col], axis=-1)
-    inside = ((at >= 0) & (at <= SIDE)).all(axis=-1)
-    margin = np.minimum(np.abs(at), np.abs(at - SIDE)).min(axis=-1)
+    inside = ((at >= 0) & (at <= side)).all(axis=-1)
+    margin = np.minimum(np.abs(at), np.abs(at - side)).min(axis=-1)
     return np.where(inside, _trilinear(volume, at - 0.5), into), margin
 
 

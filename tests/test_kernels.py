@@ -1,5 +1,7 @@
 """Wrong inputs, each tried: what is refused, by which error, and whether the message says what would be right."""
 
+import re
+
 import numpy as np
 import pytest
 import trimesh
@@ -212,14 +214,39 @@ def test_a_volume_goes_with_a_camera_and_a_batch_with_a_sequence():
             function(VOLUMES[0], [FRONT])
         with pytest.raises(TypeError, match=r"sketchcore\.Camera|one camera"):
             function(VOLUMES[0], "front")
-        with pytest.raises(ValueError, match=r"\[64, 64, 64\] or \[n, 64, 64, 64\], got \[32, 32, 32\]"):
-            function(np.zeros((32, 32, 32)), FRONT)
         with pytest.raises(TypeError, match="must hold numbers, got dtype complex128"):
             function(np.zeros((64, 64, 64), complex), FRONT)
     with pytest.raises(ValueError, match=r"into must have the volume's shape \[64, 64, 64\], got \[2, 64, 64, 64\]"):
         to_world_grid(VOLUMES[0], FRONT, VOLUMES)
     with pytest.raises(TypeError, match="into must hold numbers"):
         to_world_grid(VOLUMES[0], FRONT, np.full((64, 64, 64), "a"))
+
+
+@pytest.mark.parametrize("shape", [(16,) * 3, (65,) * 3, (64, 64, 32), (32, 32)])
+def test_only_cubes_of_four_sizes_are_resampled(shape):
+    sides, got = r"s one of \[32, 64, 128, 256\]", re.escape(str(list(shape)))
+    for function in (to_camera_grid, to_world_grid):
+        with pytest.raises(
+            ValueError, match=rf"volume must have shape \[s, s, s\] or \[n, s, s, s\], {sides}, got {got}"
+        ):
+            function(np.zeros(shape), FRONT)
+    volumes = np.zeros((1, *shape), np.float32)
+    got = re.escape(str(list(volumes.shape)))
+    for kernel in ("to_camera_grid", "to_world_grid"):
+        with pytest.raises(ValueError, match=rf"volumes must have shape \[n, s, s, s\], {sides}, got {got}"):
+            call(kernel, volumes=volumes)
+
+
+def test_grids_of_two_sizes_do_not_mix():
+    small = np.zeros((32, 32, 32), np.float32)
+    with pytest.raises(ValueError, match=r"into must have the volume's shape \[64, 64, 64\], got \[32, 32, 32\]"):
+        to_world_grid(VOLUMES[0], FRONT, small)
+    with pytest.raises(ValueError, match=r"out must have shape \[64, 64, 64\], got \[32, 32, 32\]"):
+        to_camera_grid(VOLUMES[0], FRONT, small)
+    with pytest.raises(ValueError, match=r"into must have shape \[n, 64, 64, 64\], got \[1, 32, 32, 32\]"):
+        call("to_world_grid", into=small[None])
+    with pytest.raises(ValueError, match=r"out must have shape \[2, 64, 64, 64\], got \[1, 32, 32, 32\]"):
+        call("to_camera_grid", out=small[None])
 
 
 def test_carving_takes_a_sequence_of_cameras():

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 SIDE = 64
 IMAGE = 256
+SIDES = (32, 64, 128, 256)
+"""Grids that are resampled have so many cells along each side."""
 
 
 def _as_shape(shape: object) -> Shape:
@@ -112,9 +114,10 @@ def _as_volumes(volume: NDArray[np.floating], name: str) -> NDArray[np.float32]:
     array = np.asarray(volume)
     if array.dtype.kind not in "fiub":
         raise TypeError(f"{name} must hold numbers, got dtype {array.dtype}")
-    if array.ndim not in (3, 4) or array.shape[-3:] != (SIDE,) * 3:
-        raise ValueError(f"{name} must have shape [64, 64, 64] or [n, 64, 64, 64], got {list(array.shape)}")
-    return np.ascontiguousarray(array, np.float32).reshape(-1, SIDE, SIDE, SIDE)
+    if array.ndim not in (3, 4) or array.shape[-3:] not in [(side,) * 3 for side in SIDES]:
+        expected = f"[s, s, s] or [n, s, s, s], s one of {list(SIDES)}"
+        raise ValueError(f"{name} must have shape {expected}, got {list(array.shape)}")
+    return np.ascontiguousarray(array, np.float32).reshape(-1, *array.shape[-3:])
 
 
 def _as_cameras(camera: Camera | Sequence[Camera], batch: bool) -> NDArray[np.float64]:
@@ -126,7 +129,7 @@ def _as_cameras(camera: Camera | Sequence[Camera], batch: bool) -> NDArray[np.fl
 def _as_out(
     out: NDArray[np.float32] | None, volume: NDArray[np.floating], read: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """Where a grid for each volume goes, [n, 64, 64, 64]; `out` has the volume's shape."""
+    """Where a grid for each volume goes, [n, s, s, s]; `out` has the volume's shape."""
     made = destination(out, np.shape(volume), np.float32)
     if np.may_share_memory(made, read):
         raise ValueError("out must not overlap volume: each cell is read from many places")
@@ -139,7 +142,7 @@ def to_camera_grid(
     """Resamples world volumes into camera grids, trilinear, 0 outside the world grid.
 
     Args:
-        volume: [64, 64, 64] (x, y, z), or a batch [n, 64, 64, 64].
+        volume: [s, s, s] (x, y, z), or a batch [n, s, s, s]; s is 32, 64, 128 or 256.
         camera: one camera, or n of them for a batch.
         out: a float32 array of the volume's shape to write into, and to return.
 
@@ -167,7 +170,7 @@ def to_world_grid(
     """Resamples camera grids into world volumes, trilinear; voxels outside the frustum keep `into`, or 0.
 
     Args:
-        volume: [64, 64, 64] (depth, row, col), or a batch [n, 64, 64, 64].
+        volume: [s, s, s] (depth, row, col), or a batch [n, s, s, s]; s is 32, 64, 128 or 256.
         camera: one camera, or n of them for a batch.
         into: what holds outside the frustum, the shape of `volume` (x, y, z); it is left as it is.
         out: a float32 array of the volume's shape to write into, and to return; `into` itself to change it in place.

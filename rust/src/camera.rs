@@ -2,11 +2,10 @@
 //!
 //! ```text
 //!   world: right-handed, y up          camera: x right, y down, z forward
-//!   camera grid [slice][row][col]: 64 slices between near and far, rows and columns of the image
+//!   camera grid [slice][row][col]: slices between near and far, rows and columns of the image
 //! ```
 
 use crate::error::CoreError;
-use crate::voxel::SIDE;
 use glam::{DMat3, DVec3};
 
 /// Pixels along each side of a drawing.
@@ -93,9 +92,9 @@ impl Camera {
         self.axes[0] * (x * h) + self.axes[1] * (y * h) + self.axes[2]
     }
 
-    /// Depth of a slice's middle.
-    pub fn slice_depth(&self, slice: usize) -> f64 {
-        self.near + (slice as f64 + 0.5) * (self.far - self.near) / SIDE as f64
+    /// Depth of the middle of one of so many slices.
+    pub fn slice_depth(&self, slice: usize, slices: usize) -> f64 {
+        self.near + (slice as f64 + 0.5) * (self.far - self.near) / slices as f64
     }
 
     /// The camera moved by a vector in its own axes.

@@ -16,7 +16,7 @@ pub fn cast(volume: &[f32], level: f32, camera: &Camera, size: usize) -> Buffers
     assert_eq!(volume.len(), CELLS);
     // Around the outermost centres the volume falls to 0 within one voxel more.
     let reach = DVec3::splat(0.5 + 1.0 / SIDE as f64);
-    let read = |p: DVec3| trilinear(volume, ((p + 0.5) * SIDE as f64 - 0.5).as_vec3());
+    let read = |p: DVec3| trilinear::<SIDE>(volume, ((p + 0.5) * SIDE as f64 - 0.5).as_vec3());
     let at = |i: usize| (2 * i + 1) as f64 / size as f64 - 1.0;
     let pixels: Vec<(f32, [f32; 3])> = (0..size * size)
         .into_par_iter()

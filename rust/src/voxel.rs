@@ -10,7 +10,12 @@ pub const CELLS: usize = SIDE * SIDE * SIDE;
 
 /// The world coordinate of a voxel's centre along one axis.
 pub const fn voxel_center(index: usize) -> f64 {
-    (index as f64 + 0.5) / SIDE as f64 - 0.5
+    center_among(index, SIDE)
+}
+
+/// The same in a grid with so many voxels along each side.
+pub const fn center_among(index: usize, side: usize) -> f64 {
+    (index as f64 + 0.5) / side as f64 - 0.5
 }
 
 /// The world coordinates of all voxels' centres along one axis.

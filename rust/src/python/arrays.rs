@@ -11,7 +11,6 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-pub const GRIDS: [isize; 4] = [-1, SIDE as isize, SIDE as isize, SIDE as isize];
 pub const DRAWINGS: [isize; 3] = [-1, IMAGE as isize, IMAGE as isize];
 
 /// A contiguous array's numbers, if its shape is as given; -1 stands for any length.

@@ -1,11 +1,16 @@
 //! Volumes: made of a shape, read in another grid, and the surface that leaves the package.
 
-use super::arrays::{GRIDS, all_finite, cameras_of, checked, checked_mut, filled, same_count, shape_of};
+use super::arrays::{all_finite, cameras_of, checked, checked_mut, filled, same_count, shape_of};
+use crate::camera::Camera;
+use crate::error::CoreError;
 use crate::mesh::BilateralSettings;
 use crate::resample;
 use crate::solid;
-use crate::voxel::{BitGrid, CELLS, SIDE};
-use numpy::{IntoPyArray, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
+use crate::voxel::{BitGrid, SIDE};
+use numpy::{
+    IntoPyArray, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn,
+    PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 #[pyfunction]
@@ -44,6 +49,41 @@ fn voxels<'py>(
     })
 }
 
+type Kernel = fn(&[f32], &[Camera], &mut [f32]) -> Result<(), CoreError>;
+
+/// Both ways between grids of one size.
+struct Resampling {
+    side: usize,
+    to_camera_grid: Kernel,
+    to_world_grid: Kernel,
+}
+
+impl Resampling {
+    fn of_side<const N: usize>() -> Self {
+        let (to_camera_grid, to_world_grid) = (resample::to_camera_grid::<N>, resample::to_world_grid::<N>);
+        Self { side: N, to_camera_grid, to_world_grid }
+    }
+
+    fn of_shape(volumes: &[usize]) -> Result<Self, CoreError> {
+        match *volumes {
+            [_, 32, 32, 32] => Ok(Self::of_side::<32>()),
+            [_, 64, 64, 64] => Ok(Self::of_side::<64>()),
+            [_, 128, 128, 128] => Ok(Self::of_side::<128>()),
+            [_, 256, 256, 256] => Ok(Self::of_side::<256>()),
+            _ => Err(CoreError::WrongShape {
+                what: "volumes",
+                expected: "[n, s, s, s], s one of [32, 64, 128, 256]".into(),
+                got: format!("{volumes:?}"),
+            }),
+        }
+    }
+
+    fn grids(&self) -> [isize; 4] {
+        let side = self.side as isize;
+        [-1, side, side, side]
+    }
+}
+
 #[pyfunction]
 #[pyo3(signature = (volumes, cameras, out=None))]
 pub fn to_camera_grid<'py>(
@@ -53,10 +93,11 @@ pub fn to_camera_grid<'py>(
     out: Option<Bound<'py, PyArrayDyn<f32>>>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
     let cameras = cameras_of(&cameras)?;
-    let volumes = checked(&volumes, "volumes", &GRIDS)?;
-    same_count("cameras", cameras.len(), volumes.len() / CELLS)?;
-    let shape = [cameras.len(), SIDE, SIDE, SIDE];
-    filled(py, out, &shape, |out| resample::to_camera_grid(volumes, &cameras, out))
+    let shape = volumes.shape();
+    let kernels = Resampling::of_shape(shape)?;
+    let read = checked(&volumes, "volumes", &kernels.grids())?;
+    same_count("cameras", cameras.len(), shape[0])?;
+    filled(py, out, shape, |out| (kernels.to_camera_grid)(read, &cameras, out))
 }
 
 #[pyfunction]
@@ -67,12 +108,13 @@ pub fn to_world_grid<'py>(
     mut into: PyReadwriteArrayDyn<'py, f32>,
 ) -> PyResult<()> {
     let cameras = cameras_of(&cameras)?;
-    let volumes = checked(&volumes, "volumes", &GRIDS)?;
-    let into = checked_mut(&mut into, "into", &GRIDS)?;
+    let kernels = Resampling::of_shape(volumes.shape())?;
+    let read = checked(&volumes, "volumes", &kernels.grids())?;
+    let into = checked_mut(&mut into, "into", &kernels.grids())?;
     all_finite(into, "into")?;
-    same_count("cameras", cameras.len(), volumes.len() / CELLS)?;
-    same_count("into", into.len() / CELLS, cameras.len())?;
-    py.detach(|| resample::to_world_grid(volumes, &cameras, into))?;
+    same_count("cameras", cameras.len(), volumes.shape()[0])?;
+    same_count("into", into.len() / kernels.side.pow(3), cameras.len())?;
+    py.detach(|| (kernels.to_world_grid)(read, &cameras, into))?;
     Ok(())
 }
 
