@@ -64,12 +64,18 @@ def test_the_command_reports_every_job(monkeypatch):
 
 @pytest.mark.slow
 def test_growth_is_measured_and_plotted(monkeypatch, tmp_path):
-    for name, small in (("PRIMITIVES", (1, 2, 3, 4)), ("SIZES", (64, 65)), ("TRIANGLES", (100, 200)), ("SAMPLES", 2)):
+    for name, small in (
+        ("PRIMITIVES", (1, 2, 3, 4)),
+        ("SIZES", (64, 65)),
+        ("TRIANGLES", (100, 200)),
+        ("SIDES", (32, 64)),
+        ("SAMPLES", 2),
+    ):
         monkeypatch.setattr(growth, name, small)
     done = []
     curves = growth.growth(1, progress=lambda *at: done.append(at))
-    assert done == [(i, 5) for i in range(1, 6)]
-    assert [len(curve.work) for curve in curves[:4]] == [4, 4, 2, 2]
+    assert done == [(i, 7) for i in range(1, 8)]
+    assert [len(curve.work) for curve in curves[:6]] == [4, 4, 2, 2, 2, 2]
     for curve in curves:
         assert len(curve.seconds) == len(curve.work)
         assert sorted(curve.work) == curve.work

@@ -37,11 +37,12 @@ def _errors() -> Iterator[None]:
 
 
 @contextmanager
-def _bar(title: str, total: int, quiet: bool = False) -> Iterator[Any]:
+def _bar(title: str, total: int | None = None, quiet: bool = False) -> Iterator[Any]:
+    """A bar, and what moves it: `show(done)`, or `show(done, total)` where only the work knows how much it is."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), disable=quiet) as bar:
         task = bar.add_task(title, total=total)
-        yield lambda done: bar.update(task, completed=done)
+        yield lambda done, total=None: bar.update(task, completed=done, total=total)
 
 
 @app.command()
@@ -149,8 +150,8 @@ def evaluate(
         from sketchcore.evaluate import evaluate as measure
         from sketchcore.evaluate.present import as_table, save_plot
 
-        with _bar("shapes", shapes or 500) as show:
-            report = measure(sk.load_model(model), shapes, progress=lambda done, total: show(done))
+        with _bar("shapes") as show:
+            report = measure(sk.load_model(model), shapes, progress=show)
         if plot is not None:
             save_plot(report, plot)
     if as_json:
@@ -179,12 +180,12 @@ def bench(
         from sketchcore.bench.growth import growth as measure_growth
         from sketchcore.bench.present import as_table as table
 
-        with _bar("jobs", 7) as show:
-            report = measure(repetitions, progress=lambda done, total: show(done))
+        with _bar("jobs") as show:
+            report = measure(repetitions, progress=show)
         curves: list[Curve] = []
         if growth is not None:
-            with _bar("growth", 5) as show:
-                curves = measure_growth(repetitions, progress=lambda done, total: show(done))
+            with _bar("growth") as show:
+                curves = measure_growth(repetitions, progress=show)
             save_plot(curves, growth)
     if as_json:
         typer.echo(json.dumps(report.to_dict() | {"growth": [asdict(curve) for curve in curves]}))

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import trimesh
 
 import sketchcore as sk
 from sketchcore.atomic import replacing
 from sketchcore.bench.solids import torus
 from sketchcore.bench.timing import medians
+from sketchcore.grids import SIDES
 
 CAMERA = sk.VIEWPOINTS["quarter-037"]
 PRIMITIVES = (2, 4, 8, 16, 32, 64)
@@ -42,7 +44,7 @@ class Curve:
 
 
 def growth(repetitions: int = 5, progress: Callable[[int, int], None] | None = None) -> list[Curve]:
-    """Measures shapes against primitives, drawings against pixels, meshes against triangles, samples against threads.
+    """Measures what each kernel costs as its work grows: primitives, pixels, triangles, cells, threads.
 
     Args:
         repetitions: each figure is the median of so many.
@@ -53,6 +55,7 @@ def growth(repetitions: int = 5, progress: Callable[[int, int], None] | None = N
     """
     shapes = [_shape(count) for count in PRIMITIVES]
     meshes = [trimesh.Trimesh(*torus(count), process=False) for count in TRIANGLES]
+    grids = [np.random.default_rng(side).random((side,) * 3, np.float32) for side in SIDES]
     threads = range(1, (os.cpu_count() or 1) + 1)
     batch = sk.generate(0, SAMPLES)
     measured: list[tuple[str, str, Iterable[int], Sequence[Callable[[], object]]]] = [
@@ -64,6 +67,18 @@ def growth(repetitions: int = 5, progress: Callable[[int, int], None] | None = N
             "triangles",
             (len(m.faces) for m in meshes),
             [partial(sk.voxelize, mesh) for mesh in meshes],
+        ),
+        (
+            "to_camera_grid",
+            "cells a side",
+            SIDES,
+            [partial(sk.to_camera_grid, grid, CAMERA, out=np.empty_like(grid)) for grid in grids],
+        ),
+        (
+            "to_world_grid",
+            "cells a side",
+            SIDES,
+            [partial(sk.to_world_grid, grid, CAMERA, out=np.empty_like(grid)) for grid in grids],
         ),
         (
             f"generate, {SAMPLES} samples",
@@ -99,17 +114,21 @@ def save_plot(curves: list[Curve], path: str | os.PathLike[str]) -> None:
     from matplotlib.figure import Figure
 
     units = list(dict.fromkeys(curve.unit for curve in curves))
-    canvas = Figure(figsize=(4 * len(units), 4), layout="constrained")
-    for panel, unit in zip(canvas.subplots(1, len(units), squeeze=False)[0], units, strict=True):
+    rows = -(-len(units) // 3)
+    canvas = Figure(figsize=(12, 3.5 * rows), layout="constrained")
+    for i, unit in enumerate(units):
+        panel = canvas.add_subplot(rows, 3, i + 1)
         shown = [curve for curve in curves if curve.unit == unit]
         for curve in shown:
             cost = [1e3 * seconds for seconds in curve.seconds]
             rate = [curve.samples / seconds for seconds in curve.seconds]
             panel.plot(curve.work, rate if curve.samples else cost, marker="o", label=curve.name)
         if shown[0].samples:
+            panel.margins(y=0.1)
             panel.set(ylim=(0, None), ylabel="samples a second")
         else:
             panel.set(xscale="log", yscale="log", ylabel="milliseconds")
+            panel.yaxis.set_major_formatter("{x:g}")
         panel.set_xlabel(unit)
         panel.set_xticks(shown[0].work, [f"{work:,}" for work in shown[0].work])
         panel.set_xticks([], minor=True)
