@@ -126,3 +126,9 @@ def test_draw(benchmark):
 @pytest.mark.benchmark(group="one sample")
 def test_generate_one(benchmark):
     benchmark(sk.generate, 0, 1, threads=1)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.benchmark(group="batch of 64, as in `cargo bench`")
+def test_generate_64(benchmark, threads):
+    benchmark(sk.generate, 0, 64, threads=threads, out=sk.generate(0, 64))
