@@ -33,7 +33,7 @@ def guess_viewpoint(model: Model, drawing: NDArray[np.uint8]) -> list[str]:
         model: the network.
         drawing: uint8 [256, 256], ink 255 on 0.
     """
-    return sorted(QUARTER_VIEWS, key=lambda name: _plausibility(model, drawing, VIEWPOINTS[name]), reverse=True)
+    return [name for _, name in _ranked(model, drawing)]
 
 
 def guess_camera(model: Model, drawing: NDArray[np.uint8]) -> tuple[str, Camera]:
@@ -47,8 +47,7 @@ def guess_camera(model: Model, drawing: NDArray[np.uint8]) -> tuple[str, Camera]
         model: the network.
         drawing: uint8 [256, 256], ink 255 on 0.
     """
-    name = guess_viewpoint(model, drawing)[0]
-    fill = _plausibility(model, drawing, VIEWPOINTS[name])
+    fill, name = _ranked(model, drawing)[0]
     if fill >= _POOR:
         return name, VIEWPOINTS[name]
     half_turn = (QUARTER_VIEWS.index(name) + len(QUARTER_VIEWS) // 2) % len(QUARTER_VIEWS)
@@ -61,6 +60,11 @@ def guess_camera(model: Model, drawing: NDArray[np.uint8]) -> tuple[str, Camera]
             tried.append((_plausibility(model, drawing, camera), near, camera))
     best, near, camera = max(tried, key=lambda one: one[0])
     return (near, camera) if best > fill + _GAIN else (name, VIEWPOINTS[name])
+
+
+def _ranked(model: Model, drawing: NDArray[np.uint8]) -> list[tuple[float, str]]:
+    fills = [(_plausibility(model, drawing, VIEWPOINTS[name]), name) for name in QUARTER_VIEWS]
+    return sorted(fills, key=lambda one: one[0], reverse=True)
 
 
 def _plausibility(model: Model, drawing: NDArray[np.uint8], camera: Camera) -> float:

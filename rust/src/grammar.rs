@@ -257,27 +257,21 @@ fn push_symmetric(shape: &mut Vec<Primitive>, mut new: Primitive) {
 }
 
 /// What to take from a cuboid to cut off the edge along an axis at a corner of its cross-section; `size` is how much of
-/// each side goes.
-fn edge_of(cuboid: Primitive, axis: usize, corner: [i8; 2], size: [f64; 2]) -> Primitive {
-    let mut edge = Primitive { kind: Kind::Wedge { axis, corner }, additive: false, ..cuboid };
+/// each side goes. Of a wedge, at its right angle, it is the wedge shrunk towards it.
+fn edge_of(primitive: Primitive, axis: usize, corner: [i8; 2], size: [f64; 2]) -> Primitive {
+    let mut edge = Primitive { kind: Kind::Wedge { axis, corner }, additive: false, ..primitive };
     let (u, v) = cross_axes(axis);
     for (a, sign, size) in [(u, corner[0], size[0]), (v, corner[1], size[1])] {
         edge.half[a] *= size;
-        edge.center[a] += f64::from(sign) * (cuboid.half[a] - edge.half[a]);
+        edge.center[a] += f64::from(sign) * (primitive.half[a] - edge.half[a]);
     }
     edge
 }
 
-/// What to take from a wedge so that a slab along its slanted face is left: the wedge shrunk towards its right angle.
+/// What to take from a wedge so that a slab along its slanted face is left.
 fn beyond_slab(wedge: Primitive, thickness: f64) -> Primitive {
     let Kind::Wedge { axis, corner } = wedge.kind else { return wedge };
-    let mut cut = Primitive { additive: false, ..wedge };
-    let (u, v) = cross_axes(axis);
-    for (a, sign) in [(u, corner[0]), (v, corner[1])] {
-        cut.half[a] *= 1.0 - thickness;
-        cut.center[a] += f64::from(sign) * (wedge.half[a] - cut.half[a]);
-    }
-    cut
+    edge_of(wedge, axis, corner, [1.0 - thickness; 2])
 }
 
 #[cfg(test)]
