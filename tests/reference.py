@@ -305,20 +305,19 @@ def outside(open_):
 
 
 def silhouette(drawing):
-    """What the flood does not reach, the lines thickened by the least radius (up to 5) that keeps it out."""
+    """What the flood does not reach, the lines thickened by the least radius (up to 14) that leaves no leak.
+
+    A leak is a pixel that is further from ink than the least radius that keeps the flood away from it, by more than 1.
+    """
     ink = drawing >= 64
-    to_ink = distance_to(ink)
-
-    def closed(radius):
-        flooded = outside(to_ink > radius)
-        return distance_to(flooded) > radius if radius else ~flooded
-
-    widest = closed(5)
-    for radius in range(6):
-        inside = closed(radius)
-        if not (widest & ~inside & (to_ink > 6)).any():
-            break
-    return inside | ink
+    squares = np.rint(distance_to(ink) ** 2)
+    ways = np.full(ink.shape, np.inf)
+    for square in np.unique(squares[squares <= 14**2]):
+        ways[~outside(squares > square) & np.isinf(ways)] = square
+    leaks = (ways > 0) & np.isfinite(ways) & (np.sqrt(np.minimum(squares, 17**2)) > np.sqrt(ways) + 1)
+    radius = ways[leaks].max(initial=0)
+    flooded = outside(squares > radius)
+    return ink | ((np.rint(distance_to(flooded) ** 2) > radius) if radius else ~flooded)
 
 
 def project(camera, points):

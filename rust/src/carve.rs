@@ -8,74 +8,69 @@ use glam::DVec3;
 /// Ink from here on counts as a line.
 pub const INK: u8 = 64;
 /// Gaps in an outline are closed up to twice this many pixels.
-const LARGEST_GAP: u16 = 5;
+const LARGEST_GAP: u16 = 14;
+/// How much further, in pixels, a region reaches from its lines than the gap is wide that the flood came in by.
+const DEEPER: f32 = 1.0;
 
 /// The inside of a drawing's outline, its lines and holes included: what a flood of the background over
 /// four-connected neighbours does not reach.
 ///
-/// Where the outline has gaps, so that the flood gets into regions too wide to be mere narrow spaces between
-/// lines, lines are thickened just enough to close the gaps, and what they gained is taken back after the flood.
+/// Where the outline has gaps, so that the flood gets into regions wider than the way in, lines are thickened just
+/// enough to close the gaps, and what they gained is taken back after the flood. Spaces that narrow inwards, or stay as
+/// narrow, are no such regions.
 pub fn silhouette(drawing: &[u8]) -> Vec<bool> {
     let ink: Vec<bool> = drawing.iter().map(|&v| v >= INK).collect();
     let to_ink = squared_distance(&ink);
-    let widest = closed(&to_ink, LARGEST_GAP);
-    for radius in 0..LARGEST_GAP {
-        let inside = closed(&to_ink, radius);
-        let too_wide = (LARGEST_GAP + 1) * (LARGEST_GAP + 1);
-        let leaked = (0..inside.len()).any(|i| widest[i] && !inside[i] && to_ink[i] > too_wide);
-        if !leaked {
-            return joined(inside, &ink);
-        }
-    }
-    joined(widest, &ink)
-}
-
-fn joined(mut inside: Vec<bool>, ink: &[bool]) -> Vec<bool> {
-    inside.iter_mut().zip(ink).for_each(|(i, k)| *i |= k);
-    inside
-}
-
-/// The inside of the lines thickened by `radius`, less as much.
-fn closed(to_ink: &[u16], radius: u16) -> Vec<bool> {
-    let outside = flood(|i| to_ink[i] > radius * radius);
+    let ways = ways_in(&to_ink);
+    let largest = LARGEST_GAP * LARGEST_GAP;
+    let leaks = ways.iter().zip(&to_ink).filter(|&(&way, &deep)| {
+        (1..=largest).contains(&way) && f32::from(deep).sqrt() > f32::from(way).sqrt() + DEEPER
+    });
+    let radius = leaks.map(|(&way, _)| way).max().unwrap_or(0);
+    let outside: Vec<bool> = ways.iter().map(|&way| way > radius).collect();
     if radius == 0 {
         return outside.iter().map(|o| !o).collect();
     }
     let to_outside = squared_distance(&outside);
-    to_outside.iter().map(|&d| d > radius * radius).collect()
+    to_outside.iter().zip(ink).map(|(&d, ink)| ink || d > radius).collect()
 }
 
-/// Pixels that can be reached from the border over open four-connected neighbours.
-fn flood(open: impl Fn(usize) -> bool) -> Vec<bool> {
-    let mut reached = vec![false; IMAGE * IMAGE];
-    let mut stack = Vec::new();
-    let mut visit = |i: usize, stack: &mut Vec<usize>| {
-        if !reached[i] && open(i) {
-            reached[i] = true;
-            stack.push(i);
+/// How wide the widest way from the border to each pixel is at its narrowest: the squared distance to ink there, and
+/// nowhere on the way less. A flood among lines thickened by a radius reaches what has a way wider than it.
+fn ways_in(to_ink: &[u16]) -> Vec<u16> {
+    const UNKNOWN: u16 = u16::MAX;
+    let mut ways = vec![UNKNOWN; IMAGE * IMAGE];
+    let widest = usize::from(to_ink.iter().copied().max().unwrap_or(0));
+    let mut by_width = vec![Vec::new(); widest + 1];
+    let mut reach = |i: usize, width: u16, by_width: &mut Vec<Vec<usize>>| {
+        if ways[i] == UNKNOWN {
+            ways[i] = width.min(to_ink[i]);
+            by_width[usize::from(ways[i])].push(i);
         }
     };
     for k in 0..IMAGE {
         for i in [k, (IMAGE - 1) * IMAGE + k, k * IMAGE, k * IMAGE + IMAGE - 1] {
-            visit(i, &mut stack);
+            reach(i, u16::MAX - 1, &mut by_width);
         }
     }
-    while let Some(i) = stack.pop() {
-        let (row, col) = (i / IMAGE, i % IMAGE);
-        if row > 0 {
-            visit(i - IMAGE, &mut stack);
-        }
-        if row + 1 < IMAGE {
-            visit(i + IMAGE, &mut stack);
-        }
-        if col > 0 {
-            visit(i - 1, &mut stack);
-        }
-        if col + 1 < IMAGE {
-            visit(i + 1, &mut stack);
+    for width in (0..=widest).rev() {
+        while let Some(i) = by_width[width].pop() {
+            let (row, col) = (i / IMAGE, i % IMAGE);
+            if row > 0 {
+                reach(i - IMAGE, width as u16, &mut by_width);
+            }
+            if row + 1 < IMAGE {
+                reach(i + IMAGE, width as u16, &mut by_width);
+            }
+            if col > 0 {
+                reach(i - 1, width as u16, &mut by_width);
+            }
+            if col + 1 < IMAGE {
+                reach(i + 1, width as u16, &mut by_width);
+            }
         }
     }
-    reached
+    ways
 }
 
 /// Carves the world grid: a voxel stays while its centre falls into every silhouette. Outside an image is outside.
@@ -124,11 +119,12 @@ mod tests {
 
     #[test]
     fn small_gaps_are_closed_and_a_wide_one_is_not() {
-        for gap in 1..=9 {
+        for gap in 1..=27 {
             let area = silhouette(&square(gap)).iter().filter(|&&b| b).count();
-            assert!(area.abs_diff(121 * 121) < 60, "gap {gap}: {area}");
+            // What a closed gap lacks is less than a half disc over it.
+            assert!(area.abs_diff(121 * 121) < 60.max(gap * gap / 2), "gap {gap}: {area}");
         }
-        assert!(silhouette(&square(30)).iter().filter(|&&b| b).count() < 1000);
+        assert!(silhouette(&square(40)).iter().filter(|&&b| b).count() < 1000);
     }
 
     #[test]
