@@ -74,9 +74,23 @@ def test_generate_writes_samples(tmp_path: Path) -> None:
 
 
 def test_evaluate_reports_as_json_and_plots(tmp_path: Path) -> None:
-    report = json.loads(run("evaluate", "--shapes", 2, "--json", "--plot", tmp_path / "plot.png"))
+    report = json.loads(run("evaluate", "--shapes", 2, "--json", "-o", tmp_path / "results"))
     assert report["shapes"] == 2
     assert [len(rounds) for rounds in report["network"]] == [6] * 4
     assert 0.9 < report["ceiling"]["mean"] < 1
-    with Image.open(tmp_path / "plot.png") as image:
+    assert json.loads((tmp_path / "results" / "accuracy.json").read_text()) == report
+    with Image.open(tmp_path / "results" / "accuracy.png") as image:
         assert image.width > 800
+
+
+@pytest.mark.parametrize("part", ["convergence", "robustness"])
+def test_every_part_on_the_test_set_has_a_table_and_a_plot(part: str, tmp_path: Path) -> None:
+    assert "fixed test set" in run("evaluate", part, "--shapes", 1, "-o", tmp_path)
+    with Image.open(tmp_path / f"{part}.png") as image:
+        assert image.width > 800
+    assert json.loads((tmp_path / f"{part}.json").read_text())["shapes"] == 1
+
+
+def test_wrong_parts_are_refused() -> None:
+    assert "the parts are accuracy" in run("evaluate", "speed", ok=False)
+    assert "--drawings" in run("evaluate", "drawings", ok=False)

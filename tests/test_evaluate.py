@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
 import sketchcore as sk
-from sketchcore.evaluate import evaluate
-from sketchcore.evaluate.measure import Figure
-from sketchcore.evaluate.present import as_table, save_plot
+from sketchcore.evaluate.accuracy import measure_accuracy
+from sketchcore.evaluate.comparison import compare
+from sketchcore.evaluate.convergence import measure_convergence
+from sketchcore.evaluate.drawings import measure_drawings
+from sketchcore.evaluate.figure import Figure
+from sketchcore.evaluate.parts import PARTS, measure_part, write_part
+from sketchcore.evaluate.present import comparison_table
+from sketchcore.evaluate.robustness import measure_robustness
 from sketchcore.evaluate.testset import Example, load_testset
 from sketchcore.nets.sketches import Sketches
 from sketchcore.outline import outline_iou, pieces
 from sketchcore.rounds import Volume, update_rounds
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
 class Oracle:
@@ -48,13 +56,105 @@ def test_the_test_set_is_what_it_was() -> None:
 
 
 def test_an_oracle_reaches_the_ceiling_and_carving_stays_below() -> None:
-    report = evaluate(Oracle(list(load_testset(3))), 3)
+    report = measure_accuracy(Oracle(list(load_testset(3))), 3)
     assert report.network[0][0].mean == pytest.approx(report.ceiling.mean)
     assert report.network[3][5].mean > 0.9
     assert all(a.mean <= b.mean for a, b in zip(report.carving, report.carving[1:], strict=False))
     assert report.carving[3].mean < report.network[3][5].mean
     assert report.orthogonal[3].mean > report.orthogonal[0].mean
-    assert as_table(report).row_count == 8
+    assert all(f.mean > 0.95 for f in report.concavities)
+    assert np.mean(report.each, axis=0) == pytest.approx([by_round[-1].mean for by_round in report.network])
+    assert report.gain[0].mean == pytest.approx(report.network[1][5].mean - report.network[0][5].mean)
+    assert PARTS["accuracy"].table(report).row_count == 10
+
+
+class Carver:
+    """Fills the visual hull: all that an outline can tell."""
+
+    device = torch.device("cpu")
+
+    def first_prediction(self, sketches: Sketches) -> Volume:
+        cameras = [sk.Camera.from_packed(row) for row in sketches.cameras]
+        return sk.carve(sketches.drawings, cameras).astype(np.float32)
+
+    def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
+        yield self.first_prediction(sketches)  # nothing changes afterwards: it stops at once
+
+
+def test_carving_leaves_no_concavity_empty_and_its_early_stop_counts_for_all_rounds() -> None:
+    report = measure_accuracy(Carver(), 2)
+    assert [f.mean for f in report.concavities] == [0.0] * 4
+    for by_round, carving in zip(report.network, report.carving, strict=True):
+        assert {f.mean for f in by_round} == {carving.mean}
+
+
+class Fading(Oracle):
+    """Forgets with every round and with every drawing that comes before the first one."""
+
+    def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
+        truth = next(super().rounds(sketches, 0))
+        for number in range(iterations + 1):
+            volume = truth.copy()
+            volume[:, : 4 * number] = 0
+            yield volume
+
+
+def test_convergence_of_a_model_that_gets_worse() -> None:
+    report = measure_convergence(Fading(list(load_testset(2))), 2)
+    assert all(lost > 0.2 for lost in report.lost)
+    assert report.refined.mean < -0.2
+    assert len(report.change[0]) == 10
+    assert len(report.network[3]) == 11
+    # Each order begins with another drawing, whose frustum reaches elsewhere.
+    assert all(spread.mean > 0 for spread in report.orders)
+    still = measure_convergence(Carver(), 1)
+    assert still.lost == [0.0] * 4
+    assert all(f.mean == 0 for by_round in still.change for f in by_round)
+    assert all(f.mean == 0 for f in still.orders)
+
+
+def test_carving_suffers_from_faulty_drawings() -> None:
+    report = measure_robustness(Carver(), 2)
+    assert report.clean[1].mean > report.clean[0].mean
+    assert report.drop["shift"][2][1].mean > report.drop["shift"][0][1].mean > 0.05
+    assert report.drop["all together"][2][1].mean > 0.1
+    assert PARTS["robustness"].table(report).row_count == 10
+
+
+def test_peoples_drawings_are_measured_by_their_outlines(tmp_path: Path) -> None:
+    report = measure_drawings(Carver(), [EXAMPLES], tmp_path)
+    assert {drawn.name for drawn in report.objects} == {"chair", "house", "mug", "car"}
+    assert all(overlap > 0.9 for drawn in report.objects for overlap in drawn.outline)
+    assert {path.name for path in tmp_path.iterdir()} == {"chair.png", "house.png", "mug.png", "car.png"}
+    with pytest.raises(FileNotFoundError, match="no folder"):
+        measure_drawings(Carver(), [tmp_path / "nowhere"])
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(ValueError, match="holds no drawings"):
+        measure_drawings(Carver(), [tmp_path / "empty"])
+    (tmp_path / "examples.json").write_text('[{"name": "x"}]')
+    with pytest.raises(ValueError, match="no list of named objects"):
+        measure_drawings(Carver(), [tmp_path])
+
+
+def test_reports_are_written_compared_and_refused(tmp_path: Path) -> None:
+    for folder, model in (("oracle", Oracle(list(load_testset(2)))), ("carver", Carver())):
+        (tmp_path / folder).mkdir()
+        write_part("accuracy", measure_accuracy(model, 2), tmp_path / folder)
+        assert (tmp_path / folder / "accuracy.png").stat().st_size > 10_000
+        (tmp_path / folder / "accuracy.json").rename(tmp_path / f"{folder}.json")
+    report = compare([tmp_path / "oracle.json", tmp_path / "carver.json"])
+    assert report.shapes == 2
+    assert all(difference.mean < 0 for difference in report.differences["carver"])
+    assert comparison_table(report).row_count == 3
+    with pytest.raises(ValueError, match="two or more"):
+        compare([tmp_path / "oracle.json"])
+    (tmp_path / "bad.json").write_text("{}")
+    with pytest.raises(ValueError, match="was not written by"):
+        compare([tmp_path / "oracle.json", tmp_path / "bad.json"])
+    with pytest.raises(ValueError, match="--drawings goes with"):
+        measure_part("accuracy", folders=[tmp_path])
+    with pytest.raises(ValueError, match="one or more --drawings"):
+        measure_part("drawings", shapes=3)
 
 
 def test_bootstrap_interval_of_a_known_spread() -> None:
@@ -82,8 +182,6 @@ def test_outline_and_pieces_of_a_known_solid() -> None:
     assert pieces(np.zeros((64, 64, 64), np.float32)) == []
 
 
-def test_wrong_arguments(tmp_path) -> None:
+def test_wrong_arguments() -> None:
     with pytest.raises(ValueError, match="between 1 and 500"):
         list(load_testset(0))
-    with pytest.raises(ValueError, match=r"\.png"):
-        save_plot(None, tmp_path / "plot.pdf")  # type: ignore[arg-type]

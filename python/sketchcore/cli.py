@@ -140,24 +140,59 @@ def train(
 
 @app.command()
 def evaluate(
+    part: Annotated[
+        str, typer.Argument(help="What to measure: accuracy, convergence, robustness, cost, or drawings.")
+    ] = "accuracy",
     model: Model = None,
-    shapes: Annotated[int | None, typer.Option(help="The first so many shapes; all 500 by default.")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Also write a plot, as PNG.")] = None,
+    shapes: Annotated[
+        int | None, typer.Option(help="The first so many shapes (accuracy 500, convergence 100, robustness 50).")
+    ] = None,
+    drawings: Annotated[
+        list[Path] | None, typer.Option("--drawings", help="Folders of people's drawings, for the part drawings.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder for PART.json and PART.png, or drawings' pictures.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Measure accuracy on the fixed test set: IoU by views and rounds, carving, ceiling, viewpoint."""
-    with _errors():
-        from sketchcore.evaluate import evaluate as measure
-        from sketchcore.evaluate.present import as_table, save_plot
+    """Measure a network: on the fixed test set, or on people's drawings.
 
-        with _bar("shapes") as show:
-            report = measure(sk.load_model(model), shapes, progress=show)
-        if plot is not None:
-            save_plot(report, plot)
+    accuracy: IoU by views and rounds, concavities, carving, ceiling, viewpoint. convergence: ten rounds, and orders of
+    the drawings. robustness: faulty drawings. cost: time and memory. drawings: outlines of people's drawings, pieces,
+    and pictures from four sides.
+    """
+    with _errors():
+        from sketchcore.evaluate.parts import PARTS, measure_part, write_part
+
+        if part not in PARTS:
+            raise ValueError(f"unknown part {part!r}; the parts are {', '.join(PARTS)}")
+        with _bar(part) as show:
+            report = measure_part(part, model, shapes, drawings, out, show)
+        if out is not None:
+            write_part(part, report, out)
     if as_json:
         typer.echo(json.dumps(report.to_dict()))
     else:
-        _console.print(as_table(report))
+        _console.print(PARTS[part].table(report))
+
+
+@app.command()
+def compare(
+    reports: Annotated[
+        list[Path], typer.Argument(help="NAME.json of two or more networks (evaluate accuracy --json).")
+    ],
+    as_json: Json = False,
+) -> None:
+    """Set networks side by side: IoU by views, and the paired difference to the first one's."""
+    with _errors():
+        from sketchcore.evaluate.comparison import compare as measure
+        from sketchcore.evaluate.present import comparison_table
+
+        report = measure(reports)
+    if as_json:
+        typer.echo(json.dumps(report.to_dict()))
+    else:
+        _console.print(comparison_table(report))
 
 
 @app.command()

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sketchcore.camera import pack_cameras
+from sketchcore.camera import Camera, pack_cameras
+from sketchcore.evaluate.figure import Figure
 from sketchcore.evaluate.testset import Example, load_testset
 from sketchcore.grids import carve, to_world_grid
 from sketchcore.nets.models import Model
@@ -20,55 +21,46 @@ from sketchcore.volume import iou
 
 VIEWS = 4
 ROUNDS = 5
-RESAMPLES = 10_000
 
 
 @dataclass(frozen=True)
-class Figure:
-    """A mean over the test set with its 95 % bootstrap interval."""
-
-    mean: float
-    low: float
-    high: float
-
-    @classmethod
-    def of(cls, values: NDArray[np.float64]) -> Figure:
-        """The mean of one value a shape; shapes are drawn again with replacement, always in the same way."""
-        random = np.random.default_rng(0)
-        picks = random.integers(0, len(values), (RESAMPLES, len(values)))
-        low, high = np.quantile(values[picks].mean(axis=1), [0.025, 0.975])
-        return cls(float(values.mean()), float(low), float(high))
-
-
-@dataclass(frozen=True)
-class Report:
-    """What `evaluate` measured; lists over views count from one view.
+class Accuracy:
+    """What `measure_accuracy` found; lists over views count from one view.
 
     Attributes:
         shapes: how many.
         network: [views][round], rounds from 0 (first prediction).
+        gain: [views - 1], what each further drawing adds after the last round.
+        concavities: [views], of the voxels inside the visual hull of the drawings and outside the shape, the share that
+            is left empty (carving: none).
         carving: [views], silhouette carving from the same drawings.
         orthogonal: [views], carving from front, top, right, back.
         ceiling: IoU of the true camera grid taken to the world grid: what one prediction can reach.
         viewpoint: share of first drawings whose viewpoint is guessed, up to the half turn about y.
         seconds: seconds a shape for all passes of the network.
+        each: [shape][views], IoU after the last round.
     """
 
     shapes: int
     network: list[list[Figure]]
+    gain: list[Figure]
+    concavities: list[Figure]
     carving: list[Figure]
     orthogonal: list[Figure]
     ceiling: Figure
     viewpoint: Figure
     seconds: float
+    each: list[list[float]]
 
     def to_dict(self) -> dict[str, Any]:
         """The report as plain data."""
         return asdict(self)
 
 
-def evaluate(model: Model, shapes: int | None = None, progress: Callable[[int, int], None] | None = None) -> Report:
-    """Measures a model on the fixed test set, from exact drawings, in the world grid.
+def measure_accuracy(
+    model: Model, shapes: int | None = None, progress: Callable[[int, int], None] | None = None
+) -> Accuracy:
+    """Measures a model on the fixed test set, from exact drawings, in the world grid (paper, sections 6.1 and 6.5).
 
     Args:
         model: the network.
@@ -80,40 +72,53 @@ def evaluate(model: Model, shapes: int | None = None, progress: Callable[[int, i
     """
     examples = list(load_testset(shapes))
     network = np.empty((len(examples), VIEWS, ROUNDS + 1))
-    carving, orthogonal = np.empty((2, len(examples), VIEWS))
+    concavities, carving, orthogonal = np.empty((3, len(examples), VIEWS))
     ceiling, viewpoint = np.empty((2, len(examples)))
     seconds = 0.0
     for i, example in enumerate(examples):
+        hulls = [carve(example.drawings[:n], list(example.cameras[:n])) for n in range(1, VIEWS + 1)]
         started = time.perf_counter()
-        network[i] = _network(model, example)
+        for v in range(VIEWS):
+            volumes = predictions(model, example, v + 1, ROUNDS)
+            network[i, v] = [iou(volume, example.world) for volume in volumes]
+            concavities[i, v] = _left_empty(volumes[-1], hulls[v], example.world)
         seconds += time.perf_counter() - started
-        carving[i] = _carving(example.drawings, list(example.cameras), example)
+        carving[i] = [iou(hull, example.world) for hull in hulls]
         orthogonal[i] = _carving(*example.orthogonal, example)
         ceiling[i] = iou(to_world_grid(example.frustum(0), example.cameras[0]), example.world)
         viewpoint[i] = _same_up_to_half_turn(guess_viewpoint(model, example.drawings[0])[0], example.viewpoint)
         if progress is not None:
             progress(i + 1, len(examples))
-    views = range(VIEWS)
-    return Report(
+    last = network[:, :, -1]
+    return Accuracy(
         shapes=len(examples),
-        network=[[Figure.of(network[:, v, r]) for r in range(ROUNDS + 1)] for v in views],
-        carving=[Figure.of(carving[:, v]) for v in views],
-        orthogonal=[Figure.of(orthogonal[:, v]) for v in views],
+        network=[[Figure.of(network[:, v, r]) for r in range(ROUNDS + 1)] for v in range(VIEWS)],
+        gain=[Figure.of(last[:, v + 1] - last[:, v]) for v in range(VIEWS - 1)],
+        concavities=[Figure.of(concavities[:, v]) for v in range(VIEWS)],
+        carving=[Figure.of(carving[:, v]) for v in range(VIEWS)],
+        orthogonal=[Figure.of(orthogonal[:, v]) for v in range(VIEWS)],
         ceiling=Figure.of(ceiling),
         viewpoint=Figure.of(viewpoint),
         seconds=seconds / len(examples),
+        each=last.tolist(),
     )
 
 
-def _network(model: Model, example: Example) -> list[list[float]]:
-    cameras = pack_cameras(example.cameras)
-    return [
-        [iou(volume, example.world) for volume in model.rounds(Sketches(example.drawings[:n], cameras[:n]), ROUNDS)]
-        for n in range(1, VIEWS + 1)
-    ]
+def predictions(model: Model, example: Example, views: int, rounds: int) -> list[NDArray[np.float32]]:
+    """The volumes of an example's first drawings: the first prediction, then each round's.
+
+    Where a model stops early, its last volume stands for the rounds that it saved.
+    """
+    made = list(model.rounds(Sketches(example.drawings[:views], pack_cameras(example.cameras[:views])), rounds))
+    return made + [made[-1]] * (rounds + 1 - len(made))
 
 
-def _carving(drawings: NDArray[np.uint8], cameras: list[Any], example: Example) -> list[float]:
+def _left_empty(volume: NDArray[np.float32], hull: NDArray[np.uint8], world: NDArray[np.uint8]) -> float:
+    concave = (hull > 0) & (world == 0)
+    return float((volume[concave] <= 0.5).mean()) if concave.any() else 1.0
+
+
+def _carving(drawings: NDArray[np.uint8], cameras: list[Camera], example: Example) -> list[float]:
     return [iou(carve(drawings[:n], cameras[:n]), example.world) for n in range(1, VIEWS + 1)]
 
 

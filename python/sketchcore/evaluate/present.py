@@ -1,68 +1,90 @@
-"""A report as a table for the terminal and as a plot."""
+"""Reports as tables for the terminal."""
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 from rich.table import Table
 
-from sketchcore.atomic import replacing
-from sketchcore.evaluate.measure import ROUNDS, Figure, Report
+from sketchcore.evaluate.accuracy import ROUNDS, Accuracy
+from sketchcore.evaluate.comparison import Comparison
+from sketchcore.evaluate.convergence import MANY_ROUNDS, Convergence
+from sketchcore.evaluate.distort import STRENGTHS
+from sketchcore.evaluate.drawings import Drawings
+from sketchcore.evaluate.robustness import COUNTS, Robustness
 
 
-def as_table(report: Report) -> Table:
-    """IoU by row and number of views; 95 % intervals in brackets for all figures."""
-    table = Table(title=f"IoU on the first {report.shapes} shapes of the fixed test set, world grid")
+def _views(n: int) -> str:
+    return f"{n} view{'s' if n > 1 else ''}"
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title)
     table.add_column("")
-    for n in range(len(report.carving)):
-        table.add_column(f"{n + 1} view{'s' if n else ''}", justify="right")
+    for column in columns:
+        table.add_column(column, justify="right")
+    return table
+
+
+def accuracy_table(report: Accuracy) -> Table:
+    """IoU by row and number of views; 95 % intervals in brackets for all figures."""
+    counts = range(1, len(report.carving) + 1)
+    table = _table(f"IoU on the first {report.shapes} shapes of the fixed test set, world grid", *map(_views, counts))
     for r in range(ROUNDS + 1):
         name = "network, first prediction" if r == 0 else f"network, round {r}"
-        table.add_row(name, *(_cell(by_round[r]) for by_round in report.network))
-    table.add_row("carving, the same drawings", *map(_cell, report.carving))
-    table.add_row("carving, front / top / right / back", *map(_cell, report.orthogonal))
+        table.add_row(name, *(str(by_round[r]) for by_round in report.network))
+    table.add_row("gain of the latest drawing", "", *map(str, report.gain))
+    table.add_row("concavities left empty", *map(str, report.concavities))
+    table.add_row("carving, the same drawings", *map(str, report.carving))
+    table.add_row("carving, front / top / right / back", *map(str, report.orthogonal))
     table.caption = (
-        f"ceiling of one camera grid {_cell(report.ceiling)}; viewpoint found (up to the half turn) "
-        f"{_cell(report.viewpoint)}; {report.seconds:.2f} s a shape"
+        f"ceiling of one camera grid {report.ceiling}; viewpoint found (up to the half turn) "
+        f"{report.viewpoint}; {report.seconds:.2f} s a shape"
     )
     return table
 
 
-def _cell(figure: Figure) -> str:
-    return f"{figure.mean:.3f} [{figure.low:.3f}, {figure.high:.3f}]"
+def convergence_table(report: Convergence) -> Table:
+    """Change and IoU after each round, by number of views."""
+    counts = range(1, len(report.network) + 1)
+    table = _table(f"Rounds, on the first {report.shapes} shapes of the fixed test set", *map(_views, counts))
+    for r in range(MANY_ROUNDS + 1):
+        table.add_row(f"IoU, round {r}", *(str(by_round[r]) for by_round in report.network))
+    for r in range(MANY_ROUNDS):
+        table.add_row(f"L2 change, round {r + 1}", *(f"{by_round[r].mean:.2f}" for by_round in report.change))
+    table.add_row("best round less last round", *(f"{lost:.4f}" for lost in report.lost))
+    table.add_row("IoU's deviation over orders", "", *(f"{spread.mean:.4f}" for spread in report.orders))
+    table.caption = f"rounds on a single drawing gain {report.refined}"
+    return table
 
 
-def save_plot(report: Report, path: str | os.PathLike[str]) -> None:
-    """IoU against the number of views, and against rounds, as a PNG.
+def robustness_table(report: Robustness) -> Table:
+    """What each fault costs, by strength and number of views."""
+    columns = [f"{_views(count)}, strength {s}" for count in COUNTS for s in (1, 2, 3)]
+    table = _table(f"IoU lost to faults, on the first {report.shapes} shapes of the fixed test set", *columns)
+    for kind, by_strength in report.drop.items():
+        amounts = " / ".join(f"{amount:g}" for amount in STRENGTHS.get(kind, ()))
+        cells = [f"{by_strength[s][c].mean:.3f}" for c in range(len(COUNTS)) for s in range(3)]
+        table.add_row(f"{kind} {amounts}".strip(), *cells)
+    clean = ", ".join(f"{_views(n)} {figure}" for n, figure in zip(COUNTS, report.clean, strict=True))
+    table.caption = f"clean drawings: {clean}"
+    return table
 
-    Raises:
-        ValueError: if the path does not end in .png.
-        FileNotFoundError: if the folder does not exist.
-    """
-    if Path(path).suffix.lower() != ".png":
-        raise ValueError(f"a plot is written as .png, got {path}")
-    from matplotlib.figure import Figure as Canvas
 
-    canvas = Canvas(figsize=(10, 4), layout="constrained")
-    left, right = canvas.subplots(1, 2, sharey=True)
-    views = list(range(1, len(report.carving) + 1))
-    lines = {
-        f"network, round {ROUNDS}": [by_round[-1] for by_round in report.network],
-        "carving, same drawings": report.carving,
-        "carving, orthogonal views": report.orthogonal,
-    }
-    for label, figures in lines.items():
-        means = [f.mean for f in figures]
-        left.plot(views, means, marker="o", label=label)
-        left.fill_between(views, [f.low for f in figures], [f.high for f in figures], alpha=0.2)
-    left.axhline(report.ceiling.mean, color="grey", linestyle=":", label="ceiling of one camera grid")
-    left.set(xlabel="drawings", ylabel="IoU, world grid", xticks=views, ylim=(0, 1))
-    left.legend(fontsize="small")
-    for n, by_round in zip(views, report.network, strict=True):
-        right.plot(range(ROUNDS + 1), [f.mean for f in by_round], marker="o", label=f"{n} drawings")
-    right.set(xlabel="round")
-    right.legend(fontsize="small")
-    canvas.suptitle(f"{report.shapes} shapes of the fixed test set")
-    with replacing(path) as fresh:
-        canvas.savefig(fresh, dpi=120)
+def drawings_table(report: Drawings) -> Table:
+    """How well each solid fills its drawings' outlines."""
+    table = _table("People's drawings", "outline IoU", "pieces", "viewpoint")
+    for drawn in report.objects:
+        overlaps = " ".join(f"{overlap:.2f}" for overlap in drawn.outline)
+        table.add_row(drawn.name, overlaps, str(drawn.pieces), " ".join(drawn.views) + " (guessed)" * drawn.guessed)
+    return table
+
+
+def comparison_table(report: Comparison) -> Table:
+    """IoU of each network, and how far it is from the first one's."""
+    counts = range(1, len(next(iter(report.networks.values()))) + 1)
+    first = next(iter(report.networks))
+    table = _table(f"IoU on {report.shapes} shapes of the fixed test set, world grid", *map(_views, counts))
+    for name, figures in report.networks.items():
+        table.add_row(name, *map(str, figures))
+        if name != first:
+            table.add_row(f"  less {first}", *map(str, report.differences[name]))
+    return table

@@ -1,0 +1,93 @@
+"""The parts of an evaluation: how each is measured, shown and plotted."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from rich.table import Table
+
+from sketchcore.atomic import replacing
+from sketchcore.evaluate import present
+from sketchcore.evaluate.accuracy import measure_accuracy
+from sketchcore.evaluate.convergence import measure_convergence
+from sketchcore.evaluate.drawings import measure_drawings
+from sketchcore.evaluate.plots import plot_accuracy, plot_convergence, plot_robustness
+from sketchcore.evaluate.robustness import measure_robustness
+from sketchcore.reconstruction import load_model
+
+
+@dataclass(frozen=True)
+class Part:
+    """One part.
+
+    Attributes:
+        measure: makes its report.
+        table: shows it.
+        plot: writes it as a PNG; None where there is nothing to plot.
+        by_shapes: whether it is measured on the fixed test set.
+    """
+
+    measure: Callable[..., Any]
+    table: Callable[[Any], Table]
+    plot: Callable[[Any, Path], None] | None = None
+    by_shapes: bool = True
+
+
+PARTS: Mapping[str, Part] = MappingProxyType(
+    {
+        "accuracy": Part(measure_accuracy, present.accuracy_table, plot_accuracy),
+        "convergence": Part(measure_convergence, present.convergence_table, plot_convergence),
+        "robustness": Part(measure_robustness, present.robustness_table, plot_robustness),
+        "drawings": Part(measure_drawings, present.drawings_table, by_shapes=False),
+    }
+)
+
+
+def measure_part(
+    name: str,
+    weights: str | os.PathLike[str] | None = None,
+    shapes: int | None = None,
+    folders: Sequence[Path] | None = None,
+    out: Path | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Any:
+    """The report of a part.
+
+    Args:
+        name: from `PARTS`.
+        weights: path to weights; None for those in the package.
+        shapes: the first so many of the test set; None for as many as the part takes by itself.
+        folders: of drawings, for the part "drawings" alone.
+        out: folder for the pictures of the part "drawings"; made where it is missing.
+        progress: called as `progress(done, total)`.
+
+    Raises:
+        ValueError: for arguments that the part does not take, or lacks.
+        OSError: if the folder cannot be made.
+    """
+    part = PARTS[name]
+    if out is not None:
+        out.mkdir(exist_ok=True)
+    if part.by_shapes:
+        if folders:
+            raise ValueError(f"{name} is measured on the fixed test set; --drawings goes with the part drawings")
+        count = {} if shapes is None else {"shapes": shapes}
+        return part.measure(load_model(weights), progress=progress, **count)
+    if not folders or shapes is not None:
+        raise ValueError(f"{name} takes one or more --drawings FOLDER, and no --shapes")
+    return part.measure(load_model(weights), folders, out, progress)
+
+
+def write_part(name: str, report: Any, folder: Path) -> None:
+    """Writes a report as NAME.json and, where it can be plotted, NAME.png."""
+    with replacing(folder / f"{name}.json") as fresh:
+        Path(fresh).write_text(json.dumps(report.to_dict()) + "\n")
+    plot = PARTS[name].plot
+    if plot is not None:
+        plot(report, folder / f"{name}.png")
