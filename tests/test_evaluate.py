@@ -116,7 +116,7 @@ def test_convergence_of_a_model_that_gets_worse() -> None:
 def test_carving_suffers_from_faulty_drawings() -> None:
     report = measure_robustness(Carver(), 2)
     assert report.clean[1].mean > report.clean[0].mean
-    assert report.drop["shift"][2][1].mean > report.drop["shift"][0][1].mean > 0.05
+    assert report.drop["shift"][2][1].mean > max(0.1, report.drop["shift"][0][1].mean)
     assert report.drop["all together"][2][1].mean > 0.1
     assert PARTS["robustness"].table(report).row_count == 10
 
