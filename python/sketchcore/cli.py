@@ -114,8 +114,8 @@ def train(
     preset: Annotated[
         str,
         typer.Option(
-            help="compact; laptop (one hour on two cores) or gpu (25 minutes on one), which are compact as well; paper "
-            "(the paper's networks and procedure); and alternatives to compact on the same samples, by the same "
+            help="compact; laptop (one hour on two cores) or gpu (25 minutes on a GPU), which are compact as well; "
+            "paper (the paper's networks and procedure); and alternatives to compact on the same samples, by the same "
             "optimisers: fractional and distance (other truths), paper-matched and multiscale (other networks)."
         ),
     ] = "compact",
