@@ -17,7 +17,8 @@ from sketchcore.nets.models import CompactModel
 from sketchcore.nets.outlines import heed_outlines
 from sketchcore.nets.sketches import Sketches, mirror_cameras
 from sketchcore.train.chains import Chain, compact_inputs
-from sketchcore.train.loss import occupancy_loss
+from sketchcore.train.loss import distance_loss, occupancy_loss
+from sketchcore.train.truth import WORLD_TRUTHS
 
 TINY = CompactConfig(stem=8, image=(16, 16, 16), features=8, fused=8, world=(8, 16, 16), groups=2)
 CPU = torch.device("cpu")
@@ -28,8 +29,8 @@ def chains(counts: tuple[int, ...] = (1, 2), depth: int = 1) -> list[Chain]:
     made = []
     for i, count in enumerate(counts):
         sketches = Sketches(batch.drawings[i, :count], np.ascontiguousarray(batch.packed_cameras[i, :count]))
-        half = np.ascontiguousarray(batch.world[i, :, :, 32:])
-        made.append(Chain(sketches, half, 1, depth, half.astype(np.float32) * (depth > 0)))
+        half = np.ascontiguousarray(batch.world[i, :, :, 32:], np.float32)
+        made.append(Chain(sketches, half, 1, depth, half * (depth > 0)))
     return made
 
 
@@ -170,32 +171,40 @@ def test_a_volume_known_before_is_one_prediction_among_others() -> None:
     np.testing.assert_allclose(next(model.rounds(sketches, 0, start)), heed_outlines(mean, sketches), rtol=1e-5)
 
 
-def test_loss_against_numpy() -> None:
+@pytest.mark.parametrize("fractional", [False, True])
+def test_loss_against_numpy(fractional: bool) -> None:
     random = np.random.default_rng(0)
     logits = random.normal(size=(2, 64, 64, 32))
-    truth = (random.random((2, 64, 64, 32)) > 0.9).astype(float)
+    share = random.random((2, 64, 64, 32))
+    truth = share if fractional else (share > 0.9).astype(float)
 
     def log_loss(x: np.ndarray, t: np.ndarray) -> float:
         p = 1 / (1 + np.exp(-x))
         return float(-(t * np.log(p) + (1 - t) * np.log(1 - p)).mean())
 
     p = 1 / (1 + np.exp(-logits))
-    both, either = (p * truth).sum((1, 2, 3)), (p + truth - p * truth).sum((1, 2, 3))
+    if fractional:
+        both, either = np.minimum(p, truth).sum((1, 2, 3)), np.maximum(p, truth).sum((1, 2, 3))
+    else:
+        both, either = (p * truth).sum((1, 2, 3)), (p + truth - p * truth).sum((1, 2, 3))
     outline = np.mean([log_loss(logits.max(axis), truth.max(axis)) for axis in (1, 2, 3)])
     expected = 10 * log_loss(logits, truth) + 2 * outline + (1 - (both + 1) / (either + 1)).mean()
     got = occupancy_loss(torch.tensor(logits), torch.tensor(truth).float())
     assert float(got) == pytest.approx(expected, rel=1e-4)
 
 
-def test_a_tiny_network_learns_two_shapes() -> None:
+@pytest.mark.parametrize("kind", ["binary", "fractional", "distance"])
+def test_a_tiny_network_learns_two_shapes(kind: str) -> None:
     torch.manual_seed(0)
-    batch = chains((1, 2), depth=0)
-    made, truth = compact_inputs(batch, CPU), torch.from_numpy(np.stack([c.truth for c in batch])).float()
+    batch, samples = chains((1, 2), depth=0), generate(1, 2)
+    made = compact_inputs(batch, CPU)
+    truth = torch.from_numpy(np.stack([WORLD_TRUTHS[kind](samples, i) for i in range(2)]))
     net = CompactNet(TINY)
     optimizer = torch.optim.Adam(net.parameters(), lr=5e-3)
     losses = []
+    loss_of = distance_loss if kind == "distance" else occupancy_loss
     for _ in range(25):
-        loss = occupancy_loss(net(**made), truth)
+        loss = loss_of(net(**made), truth)
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sketchcore.nets.pieces import LEAST, join_pieces
+from sketchcore.nets.pieces import LEAST, _cheapest, join_pieces
 from sketchcore.outline import pieces
 
 
@@ -57,3 +57,25 @@ def test_bridges_are_symmetric_and_lead_through_what_is_possible(seed):
     assert len(pieces(joined)) <= len(pieces(volume))
     sizes = pieces(joined)
     assert sizes[-1] >= 0.01 * sizes[0]
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 40))
+def test_the_cheapest_voxel_of_each_piece_is_the_first_with_the_least_cost(seed, count):
+    random = np.random.default_rng(seed)
+    labels = random.integers(0, 50, (8, 8, 8), dtype=np.int32)
+    costs = random.integers(0, 4, labels.shape) / 2.0
+    costs[random.random(costs.shape) < 0.1] = np.inf
+    pieces_ = sorted(set(random.permutation(np.unique(labels))[:count].tolist()))
+    expected = [min(np.flatnonzero(labels == piece), key=lambda i: costs.flat[i]) for piece in pieces_]
+    assert _cheapest(costs, labels, pieces_).tolist() == expected
+
+
+def test_thousands_of_pieces_are_joined_as_well():
+    random = np.random.default_rng(0)
+    half = np.where(random.random((64, 64, 32)) < 0.08, 0.8, 0.2).astype(np.float32)
+    half[:4, :4, :2] = 0.8
+    volume = np.concatenate([half[:, :, ::-1], half], axis=2)
+    joined = join_pieces(volume)
+    assert len(pieces(volume)) > 10_000
+    assert len(pieces(joined)) == 1

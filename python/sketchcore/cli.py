@@ -111,15 +111,22 @@ def generate(
 @app.command()
 def train(
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for weights and checkpoints.")],
-    preset: Annotated[str, typer.Option(help="compact, or paper (the paper's networks and procedure).")] = "compact",
-    minutes: Annotated[float | None, typer.Option(help="Time for this run.")] = None,
+    preset: Annotated[
+        str,
+        typer.Option(
+            help="compact; laptop (one hour on two cores) or gpu (25 minutes on a GPU), which are compact as well; "
+            "paper (the paper's networks and procedure); and alternatives to compact on the same samples, by the same "
+            "optimisers: fractional and distance (other truths), paper-matched and multiscale (other networks)."
+        ),
+    ] = "compact",
+    minutes: Annotated[float | None, typer.Option(help="Time for this run; laptop and gpu know theirs.")] = None,
     steps: Annotated[int | None, typer.Option(help="Steps for each network, over all runs.")] = None,
     seed: Annotated[int, typer.Option(help="Of samples and initial weights.")] = 0,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint in the folder.")] = False,
     device: Annotated[str | None, typer.Option(help="cpu or cuda; the default is the best there is.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Train networks on samples straight from the generator; say --minutes or --steps."""
+    """Train networks on samples straight from the generator; say --minutes or --steps, or take laptop or gpu."""
     with _errors():
         from dataclasses import asdict
 

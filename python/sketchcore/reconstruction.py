@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sketchcore.camera import Camera, as_camera, pack_cameras
 from sketchcore.drawing import load_drawing
 from sketchcore.mesh import MESH_SUFFIXES, extract_mesh, save_mesh
-from sketchcore.nets.models import CompactModel, Model, PaperModel, build_model
+from sketchcore.nets.models import Model, build_model
 from sketchcore.nets.sketches import Sketches
 from sketchcore.nets.weights import load_weights
 from sketchcore.rounds import Volume
@@ -232,6 +232,6 @@ def load_model(model: ModelLike = None, device: str | torch.device | None = None
 
 
 @lru_cache(maxsize=2)
-def _pretrained(device: str | None) -> CompactModel | PaperModel:
+def _pretrained(device: str | None) -> Model:
     path = cast(Path, files("sketchcore") / "pretrained" / "compact.safetensors")
     return build_model(*load_weights(path), device=device)

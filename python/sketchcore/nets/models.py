@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from sketchcore.nets.compact import CompactConfig, CompactNet, read_inputs
+from sketchcore.nets.multiscale import MultiscaleNet
 from sketchcore.nets.outlines import heed_outlines
 from sketchcore.nets.pieces import join_pieces
 from sketchcore.nets.precision import autocast, pick_device, place, unit
+from sketchcore.nets.singleview import SingleViewModel
 from sketchcore.nets.sketches import Sketches
 from sketchcore.nets.unet import PaperNet
 from sketchcore.rounds import Volume, update_rounds
@@ -143,7 +145,7 @@ def _array(tensor: Tensor) -> Volume:
 
 def build_model(
     state: dict[str, Tensor], config: dict[str, Any], device: str | torch.device | None = None
-) -> CompactModel | PaperModel:
+) -> CompactModel | PaperModel | SingleViewModel:
     """The model of stored weights (`nets/weights.py`).
 
     Raises:
@@ -167,7 +169,14 @@ def build_model(
         for part, net_ in nets.items():
             _fill(net_, {k.split(".", 1)[1]: v for k, v in state.items() if k.startswith(f"{part}.")})
         return PaperModel(nets["single"], nets.get("updater"), chosen)
-    raise ValueError(f"unknown network {kind!r} in the config; 'compact' and 'paper' are known")
+    if kind == "multiscale":
+        try:
+            multiscale = MultiscaleNet(**options)
+        except TypeError as error:
+            raise ValueError(f"the config is of another version of the network 'multiscale': {error}") from error
+        _fill(multiscale, state)
+        return SingleViewModel(multiscale, chosen)
+    raise ValueError(f"unknown network {kind!r} in the config; 'compact', 'paper' and 'multiscale' are known")
 
 
 def _fill(net: nn.Module, state: dict[str, Tensor]) -> None:

@@ -37,6 +37,7 @@ class PaperNet(nn.Module):
 
     Attributes:
         updater: whether the network takes a prior volume.
+        width: the argument.
         encoder: layers `conv1` ... `conv8`, by name.
         decoder: layers `deconv1` ... `deconv6`, by name.
 
@@ -53,6 +54,7 @@ class PaperNet(nn.Module):
         if width < 1:
             raise ValueError(f"width must be at least 1, got {width}")
         self.updater = updater
+        self.width = width
         self.encoder = nn.ModuleDict()
         self.decoder = nn.ModuleDict()
 
@@ -104,12 +106,12 @@ class PaperNet(nn.Module):
         """Turn logits [B, 2, 64, 64, 64] into occupancy probabilities [B, 64, 64, 64] (depth, row, col)."""
         return logits.softmax(dim=1)[:, 1]
 
+    def describe(self) -> dict[str, object]:
+        """The arguments as plain data, for the file beside the weights; updater and single view share them."""
+        return {"width": self.width}
+
     def _check(self, drawing: Tensor, prior: Tensor | None) -> None:
-        if drawing.shape[1:] != (1, IMAGE, IMAGE) or not drawing.is_floating_point():
-            raise ValueError(
-                f"drawing must be float [B, 1, {IMAGE}, {IMAGE}] with ink 1 on 0, "
-                f"got {drawing.dtype} {list(drawing.shape)}"
-            )
+        check_drawing(drawing)
         batch = drawing.shape[0]
         if self.training and batch < 2:
             raise ValueError(
@@ -149,6 +151,18 @@ def paper_loss(logits: Tensor, truth: Tensor) -> Tensor:
     # A softmax over two classes is the logistic function of their difference.
     empty, occupied = logits.float().unbind(dim=1)
     return F.binary_cross_entropy_with_logits(occupied - empty, truth.float())
+
+
+def check_drawing(drawing: Tensor) -> None:
+    """Refuse what is no batch of drawings for a network that predicts camera grids.
+
+    Raises:
+        ValueError: unless it is float [B, 1, 256, 256].
+    """
+    if drawing.shape[1:] != (1, IMAGE, IMAGE) or not drawing.is_floating_point():
+        raise ValueError(
+            f"drawing must be float [B, 1, {IMAGE}, {IMAGE}] with ink 1 on 0, got {drawing.dtype} {list(drawing.shape)}"
+        )
 
 
 def _conv(before: int, after: int, *, normalised: bool) -> nn.Sequential:

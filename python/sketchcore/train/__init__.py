@@ -1,6 +1,6 @@
 """Training: presets, samples straight from the generator, and a loop that can be killed at any moment."""
 
 from sketchcore.train.loop import Run, train
-from sketchcore.train.presets import PRESETS, Preset
+from sketchcore.train.presets import ALTERNATIVES, PRESETS, Preset
 
-__all__ = ["PRESETS", "Preset", "Run", "train"]
+__all__ = ["ALTERNATIVES", "PRESETS", "Preset", "Run", "train"]

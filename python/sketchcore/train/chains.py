@@ -7,23 +7,25 @@ new shape.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from queue import Queue
-from threading import Event, Thread
+from functools import partial
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 
 from sketchcore.datagen.generate import generate
 from sketchcore.nets.compact import CompactConfig, CompactNet, read_inputs
+from sketchcore.nets.models import CompactModel
 from sketchcore.nets.precision import autocast, place, unit
 from sketchcore.nets.sketches import Sketches
-from sketchcore.train.loss import occupancy_loss
+from sketchcore.train.ahead import Ahead
+from sketchcore.train.heldout import heldout_iou
+from sketchcore.train.loss import distance_loss, occupancy_loss
 from sketchcore.train.presets import Preset
+from sketchcore.train.truth import WORLD_TRUTHS
 
 DRAWINGS = (0.4, 0.25, 0.2, 0.15)
 """Shares of the chains with one, two, three and four drawings."""
@@ -37,14 +39,14 @@ class Chain:
 
     Attributes:
         sketches: its drawings.
-        truth: uint8 [64, 64, 32], occupancy of the half grid z > 0.
+        truth: float32 [64, 64, 32], of the half grid z > 0 (`truth.py`).
         length: passes it goes through.
         depth: passes it went through.
         prior: float32 [64, 64, 32], the latest prediction; zeros before the first.
     """
 
     sketches: Sketches
-    truth: NDArray[np.uint8]
+    truth: NDArray[np.float32]
     length: int
     depth: int
     prior: NDArray[np.float32]
@@ -58,48 +60,13 @@ def start_chain(preset: Preset, seed: int, index: int) -> Chain:
     batch = generate(seed, 1, first=index, views=views, config=preset.generator, threads=1)
     chain = Chain(
         Sketches(batch.drawings[0], batch.packed_cameras[0]),
-        np.ascontiguousarray(batch.world[0, :, :, 32:]),
+        WORLD_TRUTHS[preset.truth](batch, 0),
         length,
         0,
         np.zeros((64, 64, 32), np.float32),
     )
     _ = chain.sketches.evidence  # on the thread that makes the chain
     return chain
-
-
-class ChainSource:
-    """Makes chains ahead of time on a thread of its own, in order of their index."""
-
-    def __init__(self, preset: Preset, seed: int, first: int) -> None:
-        self._made: Queue[Chain | Exception] = Queue(maxsize=2 * preset.batch)
-        self._closed = Event()
-        self._thread = Thread(target=self._run, args=(preset, seed, first), daemon=True)
-        self._thread.start()
-
-    def _run(self, preset: Preset, seed: int, first: int) -> None:
-        index = first
-        while not self._closed.is_set():
-            try:
-                self._made.put(start_chain(preset, seed, index))
-            except Exception as error:  # handed to the consumer, which raises it
-                self._made.put(error)
-                return
-            index += 1
-
-    def __iter__(self) -> Iterator[Chain]:
-        while True:
-            made = self._made.get()
-            if isinstance(made, Exception):
-                raise made
-            yield made
-
-    def close(self) -> None:
-        """Stops the thread."""
-        self._closed.set()
-        while self._thread.is_alive():
-            while not self._made.empty():
-                self._made.get()
-            self._thread.join(0.05)
 
 
 class ChainStage:
@@ -113,10 +80,15 @@ class ChainStage:
     def __init__(self, preset: Preset, seed: int, device: torch.device, samples: int, config: CompactConfig) -> None:
         self.model = place(CompactNet(config), device)
         self._device = device
+        self._loss = distance_loss if preset.truth == "distance" else occupancy_loss
         self.samples = 0
-        self._source = ChainSource(preset, seed, first=samples)
-        self._chains = iter(self._source)
+        self._chains = Ahead(partial(start_chain, preset, seed), samples, 2 * preset.batch, preset.threads)
         self._batch = [self._next() for _ in range(preset.batch)]
+
+    @property
+    def waited(self) -> float:
+        """Seconds that were spent waiting for chains."""
+        return self._chains.waited
 
     def _next(self) -> Chain:
         self.samples += 1
@@ -127,19 +99,25 @@ class ChainStage:
         for i, chain in enumerate(self._batch):
             if chain.depth >= chain.length:
                 self._batch[i] = self._next()
-        truth = torch.from_numpy(np.stack([c.truth for c in self._batch])).to(self._device).float()
+        truth = torch.from_numpy(np.stack([c.truth for c in self._batch])).to(self._device)
         with autocast(self._device):
             logits = self.model(**compact_inputs(self._batch, self._device))
-        loss = occupancy_loss(logits, truth)
+        loss = self._loss(logits, truth)
         predictions = logits.detach().float().sigmoid().cpu().numpy()
         for chain, prediction in zip(self._batch, predictions, strict=True):
             chain.prior = prediction
             chain.depth += 1
         return loss
 
+    def measure(self, net: nn.Module) -> float:
+        """The held-out IoU of a network like the model: from one drawing and from three, after a round."""
+        assert isinstance(net, CompactNet)
+        scores = heldout_iou(CompactModel(net, self._device), views=(1, 3))
+        return sum(scores) / len(scores)
+
     def close(self) -> None:
-        """Stops the thread."""
-        self._source.close()
+        """Stops the threads."""
+        self._chains.close()
 
 
 def compact_inputs(chains: list[Chain], device: torch.device) -> dict[str, Any]:

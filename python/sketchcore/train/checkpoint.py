@@ -25,6 +25,7 @@ class Progress:
         step: optimiser steps.
         samples: shapes seen.
         seconds: time spent.
+        waited: of these, seconds that were spent waiting for samples.
         iou: latest held-out IoU, if it was measured.
     """
 
@@ -32,7 +33,13 @@ class Progress:
     step: int = 0
     samples: int = 0
     seconds: float = 0.0
+    waited: float = 0.0
     iou: float | None = None
+
+    def speed(self) -> str:
+        """Samples a second, and the share of the time that was spent waiting for them, in words."""
+        seconds = max(self.seconds, 1e-9)
+        return f"{self.samples / seconds:.1f} samples/s (waited {100 * self.waited / seconds:.0f} %)"
 
 
 def save_checkpoint(

@@ -16,16 +16,17 @@ from rich.progress import Progress as Bar
 from torch import Tensor, nn
 
 from sketchcore.nets.compact import CompactConfig, CompactNet
-from sketchcore.nets.models import CompactModel, Model, PaperModel
+from sketchcore.nets.multiscale import MultiscaleNet
 from sketchcore.nets.precision import pick_device
 from sketchcore.nets.unet import PaperNet
 from sketchcore.nets.weights import save_weights
 from sketchcore.train.chains import ChainStage
 from sketchcore.train.checkpoint import Checkpoint, Progress, load_checkpoint, save_checkpoint
-from sketchcore.train.heldout import heldout_iou
 from sketchcore.train.optimizers import make_optimizers
 from sketchcore.train.papertrain import SingleStage, UpdaterStage
 from sketchcore.train.presets import PRESETS, Preset
+
+Network = CompactNet | PaperNet | MultiscaleNet
 
 
 class Stage(Protocol):
@@ -34,12 +35,21 @@ class Stage(Protocol):
     samples: int
 
     @property
-    def model(self) -> nn.Module:
+    def model(self) -> Network:
         """The network that is trained."""
+        ...
+
+    @property
+    def waited(self) -> float:
+        """Seconds that were spent waiting for samples."""
         ...
 
     def step(self) -> Tensor:
         """The loss of the next batch."""
+        ...
+
+    def measure(self, net: nn.Module) -> float:
+        """The held-out IoU of a network like the model."""
         ...
 
     def close(self) -> None:
@@ -55,7 +65,8 @@ class Run:
         out: folder for weights, configs and checkpoints.
         preset: a name from `PRESETS`.
         minutes: time for this run, all stages together; or
-        steps: optimiser steps for each stage, over all runs that it is resumed in.
+        steps: optimiser steps for each stage, over all runs that it is resumed in. Neither for the preset's minutes,
+            over all runs as well.
         seed: of the generator and of the initial weights.
         device: None for CUDA where there is one, else the CPU.
         save_every: seconds between checkpoints.
@@ -78,9 +89,12 @@ class Run:
     def __post_init__(self) -> None:
         if self.preset not in PRESETS:
             raise ValueError(f"unknown preset {self.preset!r}; the presets are {', '.join(PRESETS)}")
-        if (self.minutes is None) == (self.steps is None):
-            raise ValueError("say either minutes or steps")
-        if (self.minutes or self.steps or 0) <= 0:
+        if self.minutes is not None and self.steps is not None:
+            raise ValueError("say either minutes or steps, not both")
+        if self.minutes is None and self.steps is None and self.constants.minutes is None:
+            timed = ", ".join(name for name, preset in PRESETS.items() if preset.minutes is not None)
+            raise ValueError(f"say either minutes or steps; only {timed} know how long they take")
+        if any(given is not None and given <= 0 for given in (self.minutes, self.steps)):
             raise ValueError("minutes or steps must be more than 0")
         if not 0 <= self.seed < 2**63:
             raise ValueError(f"seed must lie between 0 and 2^63 - 1, got {self.seed}")
@@ -117,7 +131,7 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
     if resume and not existing:
         raise FileNotFoundError(f"no checkpoint in {run.out}; start without --resume")
     device = pick_device(run.device)
-    trained: dict[str, nn.Module] = {}
+    trained: dict[str, Network] = {}
     results = []
     for index, name in enumerate(stages):
         found = load_checkpoint(checkpoints[name]) if checkpoints[name].exists() else None
@@ -125,7 +139,7 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
         begun = any(checkpoints[later].exists() for later in stages[index + 1 :])
         stage = _stage(run, name, device, found, trained)
         try:
-            loop = _Loop(run, name, stage, device, found, trained, checkpoints[name])
+            loop = _Loop(run, name, stage, found, checkpoints[name])
             results.append(loop.progress if begun else loop.go(share=1 / len(stages), quiet=quiet))
         finally:
             stage.close()
@@ -134,33 +148,25 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
     return results
 
 
-def _stage(run: Run, name: str, device: torch.device, found: Checkpoint | None, trained: dict[str, nn.Module]) -> Stage:
+def _stage(run: Run, name: str, device: torch.device, found: Checkpoint | None, trained: dict[str, Network]) -> Stage:
     torch.manual_seed(run.seed)
+    constants, options = run.constants, run.options or {}
     samples = found.progress.samples if found else 0
-    width = (run.options or {}).get("width", 64)
-    if name == "single":
-        return SingleStage(run.constants, run.seed, device, samples, width)
+    if name == "compact":
+        return ChainStage(constants, run.seed, device, samples, CompactConfig(**options))
     if name == "updater":
         single = trained["single"]
         assert isinstance(single, PaperNet)
-        return UpdaterStage(run.constants, run.seed, device, samples, width, single)
-    return ChainStage(run.constants, run.seed, device, samples, CompactConfig(**(run.options or {})))
+        return UpdaterStage(constants, run.seed, device, samples, single)
+    net = PaperNet(**options) if name == "single" else MultiscaleNet(**options)
+    return SingleStage(constants, run.seed, device, samples, net)
 
 
 class _Loop:
     """One stage: optimiser, moving average, checkpoints."""
 
-    def __init__(
-        self,
-        run: Run,
-        name: str,
-        stage: Stage,
-        device: torch.device,
-        found: Checkpoint | None,
-        trained: dict[str, nn.Module],
-        path: Path,
-    ) -> None:
-        self.run, self.stage, self.device, self.trained, self.path = run, stage, device, trained, path
+    def __init__(self, run: Run, name: str, stage: Stage, found: Checkpoint | None, path: Path) -> None:
+        self.run, self.stage, self.path = run, stage, path
         self.constants = run.constants
         self.progress = found.progress if found else Progress(name)
         c = self.constants
@@ -168,7 +174,9 @@ class _Loop:
             stage.model.load_state_dict(found.model)
         self.optimizers = make_optimizers(stage.model, c)
         self.rates = [optimizer.param_groups[0]["lr"] for optimizer in self.optimizers]
-        self.average = copy.deepcopy(stage.model).eval().requires_grad_(False) if c.average else stage.model
+        self.average: Network = stage.model
+        if c.average:
+            self.average = copy.deepcopy(stage.model).eval().requires_grad_(False)
         if found:
             if c.average:
                 self.average.load_state_dict(found.average)
@@ -178,15 +186,17 @@ class _Loop:
     def go(self, share: float, quiet: bool) -> Progress:
         """Trains to the end of the stage's share of the run."""
         started = time.monotonic()
-        before = replace(self.progress)
-        limit = self.run.minutes * 60 * share if self.run.minutes else None
+        before, waited = replace(self.progress), self.stage.waited
         saved = evaluated = started
 
         def done() -> float:
-            if limit is not None:
-                return (time.monotonic() - started) / limit
-            assert self.run.steps is not None
-            return self.progress.step / self.run.steps
+            if self.run.steps is not None:
+                return self.progress.step / self.run.steps
+            seconds = time.monotonic() - started
+            if self.run.minutes is not None:
+                return seconds / (60 * share * self.run.minutes)
+            assert self.constants.minutes is not None
+            return (before.seconds + seconds) / (60 * share * self.constants.minutes)
 
         with _TrainingBar(before.stage, quiet) as bar:
             try:
@@ -196,9 +206,10 @@ class _Loop:
                     self.progress.step += 1
                     self.progress.samples = before.samples + self.stage.samples
                     self.progress.seconds = before.seconds + now - started
-                    bar.show(part, loss, self.stage.samples / (now - started), self.progress)
+                    self.progress.waited = before.waited + self.stage.waited - waited
+                    bar.show(part, loss, self.progress)
                     if now - evaluated > self.run.evaluate_every:
-                        self.progress.iou = self._evaluate()
+                        self.progress.iou = self.stage.measure(self.average.eval())
                         bar.report(self.progress)
                         evaluated = time.monotonic()
                     if now - saved > self.run.save_every:
@@ -207,7 +218,7 @@ class _Loop:
             except KeyboardInterrupt:
                 self._save()
                 raise
-            self.progress.iou = self._evaluate()
+            self.progress.iou = self.stage.measure(self.average.eval())
             self._save()
             bar.report(self.progress)
         return self.progress
@@ -235,26 +246,8 @@ class _Loop:
         if c.average:
             # The average forgets its random beginning faster than it will forget later on.
             decay = min(c.average, (self.progress.step + 1) / (self.progress.step + 10))
-            with torch.no_grad():
-                pairs = zip(self.average.parameters(), self.stage.model.parameters(), strict=True)
-                for mean, weight in pairs:
-                    mean.lerp_(weight, 1 - decay)
+            move_average(self.average, self.stage.model, decay)
         return value
-
-    def _evaluate(self) -> float:
-        self.average.eval()
-        name, net = self.progress.stage, self.average
-        model: Model
-        if isinstance(net, CompactNet):
-            model = CompactModel(net, self.device)
-            scores = heldout_iou(model, views=(1, 3))
-            return sum(scores) / len(scores)
-        assert isinstance(net, PaperNet)
-        single = net if name == "single" else self.trained["single"]
-        assert isinstance(single, PaperNet)
-        model = PaperModel(single, net if name == "updater" else None, self.device)
-        # The single view alone has nothing to update with.
-        return heldout_iou(model, views=(1,) if name == "single" else (2,), rounds=int(name == "updater"))[0]
 
     def _save(self) -> None:
         average = self.average.state_dict() if self.constants.average else {}
@@ -262,26 +255,37 @@ class _Loop:
         save_checkpoint(self.path, self.stage.model.state_dict(), average, moments, self.progress)
 
 
-def _save_weights(run: Run, trained: dict[str, nn.Module], results: list[Progress]) -> None:
-    if run.preset == "paper":
-        state = {f"{part}.{k}": v for part, net in trained.items() for k, v in net.state_dict().items()}
-        options = {"width": (run.options or {}).get("width", 64)}
-    else:
-        state = dict(trained["compact"].state_dict())
-        net = trained["compact"]
-        assert isinstance(net, CompactNet)
-        options = net.describe()
-    constants = {**asdict(run.constants), "generator": dict(run.constants.generator)}
+@torch.no_grad()
+def move_average(average: nn.Module, model: nn.Module, decay: float) -> None:
+    """Moves the average of weights and running statistics towards the model's; counters are the model's own."""
+    for mean, now in zip(average.state_dict().values(), model.state_dict().values(), strict=True):
+        if mean.is_floating_point():
+            mean.lerp_(now, 1 - decay)
+        else:
+            mean.copy_(now)
+
+
+def _save_weights(run: Run, trained: dict[str, Network], results: list[Progress]) -> None:
+    constants = run.constants
+    several = len(constants.stages) > 1
+    states = {f"{stage}." if several else "": net.state_dict() for stage, net in trained.items()}
     config = {
-        "network": run.preset,
-        "options": options,
-        "training": {"seed": run.seed, **constants, "runs": [asdict(p) for p in results]},
+        "network": constants.network,
+        "options": trained[constants.stages[0]].describe(),
+        "training": {
+            "preset": run.preset,
+            "seed": run.seed,
+            **asdict(constants),
+            "generator": dict(constants.generator),
+            "runs": [asdict(progress) for progress in results],
+        },
     }
+    state = {prefix + name: tensor for prefix, part in states.items() for name, tensor in part.items()}
     save_weights(run.out / "weights.safetensors", state, config)
 
 
 class _TrainingBar:
-    """A progress bar with samples/s and held-out IoU, and a line for each measurement; nothing when quiet."""
+    """A progress bar with samples/s, waiting and held-out IoU, and a line for each measurement; nothing when quiet."""
 
     def __init__(self, title: str, quiet: bool) -> None:
         self._bar = Bar(
@@ -301,16 +305,17 @@ class _TrainingBar:
     def __exit__(self, *_: object) -> None:
         self._bar.stop()
 
-    def show(self, part: float, loss: float, rate: float, progress: Progress) -> None:
-        """After a step: how far, the loss (smoothed), new shapes a second."""
+    def show(self, part: float, loss: float, progress: Progress) -> None:
+        """After a step: how far, the loss (smoothed), new shapes a second, the share of the time waited for them."""
         self._loss = loss if math.isnan(self._loss) else 0.98 * self._loss + 0.02 * loss
         iou = "..." if progress.iou is None else f"{progress.iou:.3f}"
-        note = f"loss {self._loss:.3f}  {rate:.1f} samples/s  held-out IoU {iou}"
+        note = f"loss {self._loss:.3f}  {progress.speed()}  held-out IoU {iou}"
         self._bar.update(self._task, completed=part, note=note)
 
     def report(self, progress: Progress) -> None:
         """A line that stays, after a measurement."""
         self._bar.console.print(
             f"{progress.stage}: step {progress.step:,}, {progress.samples:,} samples, "
-            f"{progress.seconds / 60:.1f} minutes, loss {self._loss:.3f}, held-out IoU {progress.iou:.3f}"
+            f"{progress.seconds / 60:.1f} minutes, {progress.speed()}, loss {self._loss:.3f}, "
+            f"held-out IoU {progress.iou:.3f}"
         )

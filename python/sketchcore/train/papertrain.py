@@ -1,62 +1,58 @@
-"""The paper's training: the single view on exact drawings, then the updater on its predictions (section 4.4)."""
+"""The paper's training: the single view, then the updater on its predictions (section 4.4).
+
+The multi-scale network is trained like the single view.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 
 from sketchcore import _core
 from sketchcore.datagen.generate import Batch, generate
 from sketchcore.nets.models import PaperModel
+from sketchcore.nets.multiscale import MultiscaleNet
 from sketchcore.nets.precision import autocast, place, unit
+from sketchcore.nets.singleview import SingleViewModel, SingleViewNet
 from sketchcore.nets.unet import PaperNet, paper_loss
+from sketchcore.train.ahead import Ahead
+from sketchcore.train.heldout import heldout_iou
 from sketchcore.train.presets import Preset
+from sketchcore.train.truth import in_camera_grids
 
 
-class _Batches:
-    """Batches of new samples, each made while the one before is trained on."""
+def _batches(preset: Preset, seed: int, first: int, views: int) -> Ahead[Batch]:
+    return Ahead(partial(_batch, preset, seed, first, views), 0, 1, preset.threads)
 
-    def __init__(self, preset: Preset, seed: int, first: int, views: int) -> None:
-        self._arguments = (preset, seed, views)
-        self._next_index = first
-        self._thread = ThreadPoolExecutor(max_workers=1)
-        self._coming = self._order()
 
-    def _order(self) -> Future[Batch]:
-        preset, seed, views = self._arguments
-        first, self._next_index = self._next_index, self._next_index + preset.batch
-        return self._thread.submit(
-            generate, seed, preset.batch, first=first, views=views, config=preset.generator, threads=1
-        )
-
-    def __iter__(self) -> Iterator[Batch]:
-        while True:
-            ready, self._coming = self._coming.result(), self._order()
-            yield ready
-
-    def close(self) -> None:
-        self._thread.shutdown()
+def _batch(preset: Preset, seed: int, first: int, views: int, number: int) -> Batch:
+    first += number * preset.batch
+    return generate(seed, preset.batch, first=first, views=views, config=preset.generator, threads=1)
 
 
 class SingleStage:
-    """The stage "single": one drawing from one of the eight three-quarter views, and its camera grid.
+    """The stages "single" and "multiscale": one drawing, and its camera grid.
 
     Attributes:
         model: the network that is trained.
         samples: how many shapes have been used.
     """
 
-    def __init__(self, preset: Preset, seed: int, device: torch.device, samples: int, width: int) -> None:
-        self.model = place(PaperNet(width=width), device)
+    def __init__(self, preset: Preset, seed: int, device: torch.device, samples: int, net: SingleViewNet) -> None:
+        self.model = place(net, device)
         self.samples = 0
+        self._truth = preset.truth
         self._device = device
-        self._source = _Batches(preset, seed, samples, views=1)
-        self._batches = iter(self._source)
+        self._batches = _batches(preset, seed, samples, views=1)
+
+    @property
+    def waited(self) -> float:
+        """Seconds that were spent waiting for batches."""
+        return self._batches.waited
 
     def step(self) -> Tensor:
         """One batch; returns the loss."""
@@ -65,11 +61,16 @@ class SingleStage:
         drawing = unit(batch.drawings, self._device)
         with autocast(self._device):
             logits = self.model(drawing)
-        return paper_loss(logits.float(), unit(batch.frusta[:, 0], self._device))
+        return paper_loss(logits.float(), unit(in_camera_grids(self._truth, batch.frusta[:, 0]), self._device))
+
+    def measure(self, net: nn.Module) -> float:
+        """The held-out IoU of a network like the model: from one drawing."""
+        assert isinstance(net, PaperNet | MultiscaleNet)
+        return heldout_iou(SingleViewModel(net, self._device), views=(1,), rounds=0)[0]
 
     def close(self) -> None:
-        """Stops the thread."""
-        self._source.close()
+        """Stops the threads."""
+        self._batches.close()
 
 
 class UpdaterStage:
@@ -80,15 +81,19 @@ class UpdaterStage:
         samples: how many shapes have been used.
     """
 
-    def __init__(
-        self, preset: Preset, seed: int, device: torch.device, samples: int, width: int, single: PaperNet
-    ) -> None:
-        self.model = place(PaperNet(updater=True, width=width), device)
+    def __init__(self, preset: Preset, seed: int, device: torch.device, samples: int, single: PaperNet) -> None:
+        self.model = place(PaperNet(updater=True, width=single.width), device)
         self.samples = 0
-        self._single = PaperModel(single, None, device)
+        self._truth = preset.truth
+        self._single = single
+        self._predict = SingleViewModel(single, device).predict
         self._device = device
-        self._source = _Batches(preset, seed, samples, views=2)
-        self._batches = iter(self._source)
+        self._batches = _batches(preset, seed, samples, views=2)
+
+    @property
+    def waited(self) -> float:
+        """Seconds that were spent waiting for batches."""
+        return self._batches.waited
 
     def step(self) -> Tensor:
         """One batch; returns the loss."""
@@ -98,15 +103,20 @@ class UpdaterStage:
         drawing = unit(batch.drawings[:, 1:], self._device)
         with autocast(self._device):
             logits = self.model(drawing, prior)
-        return paper_loss(logits.float(), unit(batch.frusta[:, 1], self._device))
+        return paper_loss(logits.float(), unit(in_camera_grids(self._truth, batch.frusta[:, 1]), self._device))
 
     def _priors(self, batch: Batch) -> NDArray[np.float32]:
         """The single view's predictions from drawing 0, in the camera grids of drawing 1."""
-        predictions = np.stack([self._single.predict(drawings[0], None) for drawings in batch.drawings])
+        predictions = np.ascontiguousarray(self._predict(batch.drawings[:, 0]))
         world = np.zeros_like(predictions)
         _core.to_world_grid(predictions, np.ascontiguousarray(batch.packed_cameras[:, 0]), world)
         return _core.to_camera_grid(world, np.ascontiguousarray(batch.packed_cameras[:, 1]))
 
+    def measure(self, net: nn.Module) -> float:
+        """The held-out IoU of a network like the model: from two drawings, after a round."""
+        assert isinstance(net, PaperNet)
+        return heldout_iou(PaperModel(self._single, net, self._device), views=(2,), rounds=1)[0]
+
     def close(self) -> None:
-        """Stops the thread."""
-        self._source.close()
+        """Stops the threads."""
+        self._batches.close()

@@ -3,9 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
+
+STAGES: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {"compact": ("compact",), "paper": ("single", "updater"), "multiscale": ("multiscale",)}
+)
+"""For each network, what is trained one after the other, each in an equal part of the time."""
+TRUTHS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "compact": ("binary", "fractional", "distance"),
+        "paper": ("binary", "fractional"),
+        "multiscale": ("binary", "fractional"),
+    }
+)
+"""For each network, what it can be told to be right (`truth.py`): in the world grid, or in camera grids."""
 
 
 @dataclass(frozen=True)
@@ -13,7 +26,8 @@ class Preset:
     """Constants of a training run.
 
     Attributes:
-        stages: networks trained one after the other, each in an equal part of the time.
+        network: a name from `STAGES`.
+        truth: what the network is told to be right, one of its `TRUTHS`.
         batch: samples a step.
         rate: learning rate of AdamW.
         muon: learning rate of Muon for all matrices, which AdamW then leaves alone; 0 for none.
@@ -24,9 +38,15 @@ class Preset:
         average: decay of the exponential moving average of the weights that is evaluated and saved; 0 for none.
         clip: largest norm of the gradient; 0 for no limit.
         generator: what differs from the generator's default config.
+        threads: threads that make samples; None for one a core.
+        minutes: how long a run takes that is not told, over all the pieces that it is trained in; None if it must be.
+
+    Raises:
+        ValueError: for an unknown network, or a truth that is not one of its.
     """
 
-    stages: tuple[str, ...]
+    network: str
+    truth: str
     batch: int
     rate: float
     betas: tuple[float, float]
@@ -37,28 +57,60 @@ class Preset:
     average: float = 0.0
     clip: float = 0.0
     generator: Mapping[str, Any] = field(default_factory=dict)
+    threads: int | None = 1
+    minutes: float | None = None
 
+    def __post_init__(self) -> None:
+        if self.network not in STAGES:
+            raise ValueError(f"unknown network {self.network!r}; the networks are {', '.join(STAGES)}")
+        if self.truth not in TRUTHS[self.network]:
+            known = ", ".join(TRUTHS[self.network])
+            raise ValueError(f"the network {self.network!r} has no truth {self.truth!r}; it takes {known}")
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """What is trained, one after the other, each in an equal part of the time."""
+        return STAGES[self.network]
+
+
+# Section 4.4: Adam with these constants, the single view first. Its 1,000,000 iterations are `--steps`.
+PAPER = Preset(network="paper", truth="fractional", batch=8, rate=2e-4, betas=(0.5, 0.999))
+
+COMPACT = Preset(
+    network="compact",
+    truth="binary",
+    batch=16,
+    rate=1e-3,
+    betas=(0.9, 0.98),
+    muon=2e-3,
+    weight_decay=0.02,
+    warmup=40,
+    cooldown=0.3,
+    average=0.998,
+    clip=1.0,
+    generator={
+        "grammar": {"steps": [1, 10], "wedges": 0.2, "slabs": 0.3, "fitted": 0.5, "chamfered": 0.4},
+        "free": {"share": 0.25},
+        "hand": {"share": 0.7},
+    },
+)
+
+ALTERNATIVES: Mapping[str, Preset] = MappingProxyType(
+    {
+        "compact": COMPACT,
+        "fractional": replace(COMPACT, truth="fractional"),
+        "distance": replace(COMPACT, truth="distance"),
+        "paper-matched": replace(COMPACT, network="paper", truth="fractional"),
+        "multiscale": replace(COMPACT, network="multiscale", truth="fractional"),
+    }
+)
+"""What is compared: the same samples and optimisers for all, and to be given the same minutes."""
 
 PRESETS: Mapping[str, Preset] = MappingProxyType(
     {
-        # Section 4.4: Adam with these constants, the single view first. Its 1,000,000 iterations are `--steps`.
-        "paper": Preset(stages=("single", "updater"), batch=8, rate=2e-4, betas=(0.5, 0.999)),
-        "compact": Preset(
-            stages=("compact",),
-            batch=16,
-            rate=1e-3,
-            betas=(0.9, 0.98),
-            muon=2e-3,
-            weight_decay=0.02,
-            warmup=40,
-            cooldown=0.3,
-            average=0.998,
-            clip=1.0,
-            generator={
-                "grammar": {"steps": [1, 10], "wedges": 0.2, "slabs": 0.3, "fitted": 0.5, "chamfered": 0.4},
-                "free": {"share": 0.25},
-                "hand": {"share": 0.7},
-            },
-        ),
+        "paper": PAPER,
+        **ALTERNATIVES,
+        "laptop": replace(COMPACT, minutes=60.0),
+        "gpu": replace(COMPACT, batch=64, threads=None, minutes=25.0),
     }
 )
