@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pytest
@@ -26,8 +26,8 @@ class Oracle:
     def __init__(self, examples: list[Example]) -> None:
         self.truth = {camera.packed.tobytes(): e.frustum(i) for e in examples for i, camera in enumerate(e.cameras)}
 
-    def first_prediction(self, sketches: Sketches) -> Volume:
-        return next(self.rounds(sketches, 0))
+    def first_predictions(self, samples: Sequence[Sketches]) -> Iterator[Volume]:
+        return (next(self.rounds(sketches, 0)) for sketches in samples)
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         blank = np.full((64, 64, 64), 0.1, np.float32)

@@ -1,4 +1,4 @@
-"""The paper's iterative update: drawing after drawing, round after round (section 3.2)."""
+"""The paper's iterative update: drawing after drawing, round after round (section 3.2). And what a round changed."""
 
 from __future__ import annotations
 
@@ -46,3 +46,9 @@ def visit(predict: Predict, cameras: NDArray[np.float64], view: int, volume: Vol
     into = np.zeros((64, 64, 64), np.float32) if volume is None else volume.copy()
     _core.to_world_grid(prediction[None], camera, into[None])
     return into
+
+
+def crossing(before: Volume, after: Volume) -> float:
+    """The voxels that are on the other side of one half than before, as a share of those now above it."""
+    occupied = after > 0.5
+    return int((occupied != (before > 0.5)).sum()) / max(int(occupied.sum()), 1)
