@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,10 @@ from sketchcore import _core
 from sketchcore.datagen import generate
 from sketchcore.nets.compact import CompactConfig, CompactNet
 from sketchcore.nets.decoder import fold, unfold
+from sketchcore.nets.inference import flip_cells, whole
 from sketchcore.nets.models import CompactModel
 from sketchcore.nets.outlines import heed_outlines
+from sketchcore.nets.pieces import join_pieces
 from sketchcore.nets.sketches import Sketches, mirror_cameras
 from sketchcore.train.chains import Chain, compact_inputs
 from sketchcore.train.loss import distance_loss, occupancy_loss
@@ -137,13 +140,18 @@ def test_rounds_take_turns_and_average() -> None:
     model = CompactModel(awake(CompactNet(TINY)), CPU)
     sketches = chains((2,))[0].sketches
     looks = []
-    read = model._read
-    model._read = lambda s: (looks.append(s.cameras), read(s))[1]  # type: ignore[method-assign, func-returns-value]
+    read = model.net.read
+
+    def seen(samples: Sequence[Sketches], evidence: torch.Tensor) -> torch.Tensor:
+        looks.append(samples[0].cameras)
+        return read(samples, evidence)
+
+    model.net.read = seen  # type: ignore[method-assign]
     volumes = list(model.rounds(sketches, 5))
     assert len(volumes) == 6
     cameras = sketches.cameras
-    mirrors = [cameras, mirror_cameras(cameras, 2), mirror_cameras(cameras, 0)]
-    mirrors.append(mirror_cameras(mirrors[2], 2))
+    mirrors = [cameras, mirror_cameras(cameras, 0), mirror_cameras(cameras, 2)]
+    mirrors.append(mirror_cameras(mirrors[1], 2))
     np.testing.assert_array_equal(looks, mirrors, "each of the four is read once")
     for volume in volumes:
         assert volume.shape == (64, 64, 64)
@@ -154,11 +162,23 @@ def test_rounds_take_turns_and_average() -> None:
 def test_a_look_along_x_answers_in_the_world_as_it_is() -> None:
     model = CompactModel(awake(CompactNet(TINY)), CPU)
     sketches = chains((2,))[0].sketches
-    evidence = torch.from_numpy(sketches.evidence[None]).float() / 255
-    plain = model._decide(model._read(sketches), evidence, None, 2, flip=False)
-    mirrored = sketches.mirrored(0)
-    twice_mirrored = model._decide(model._read(mirrored.mirrored(0)), evidence.flip(2), None, 2, flip=True)
-    torch.testing.assert_close(plain, twice_mirrored.flip(1), atol=1e-4, rtol=1e-4)
+    evidence = model.net.evidence([sketches])
+    # To the network, the second round is a mirrored world: it reads and knows what it would of that one.
+    calls = []
+    decide = model.net.decide
+
+    def heard(readings: torch.Tensor, prior: torch.Tensor | None, counts: Sequence[int]) -> torch.Tensor:
+        calls.append((readings, prior, decide(readings, prior, counts)))
+        return calls[-1][2]
+
+    model.net.decide = heard  # type: ignore[method-assign]
+    _, second = model.rounds(sketches, 1)
+    (_, _, first_answer), (readings, prior, answer) = calls
+    assert prior is not None
+    torch.testing.assert_close(readings, model.net.read([sketches.mirrored(0)], flip_cells(evidence)))
+    torch.testing.assert_close(prior, flip_cells(first_answer))
+    mean = whole((first_answer + flip_cells(answer)) / 2)
+    np.testing.assert_allclose(second, join_pieces(heed_outlines(mean, sketches)), atol=1e-6)
 
 
 def test_a_volume_known_before_is_one_prediction_among_others() -> None:
@@ -166,7 +186,7 @@ def test_a_volume_known_before_is_one_prediction_among_others() -> None:
     sketches = chains((1,))[0].sketches
     start = np.zeros((64, 64, 64), np.float32)
     start[:, :, :32] = 1.0
-    model._decide = lambda *_, **__: torch.full((1, 64, 64, 32), 0.2)  # type: ignore[method-assign]
+    model.net.decide = lambda *_: torch.full((1, 32, 32, 16, 8), 0.2)  # type: ignore[method-assign]
     mean = np.full((64, 64, 64), (0.5 + 0.2) / 2, np.float32)
     np.testing.assert_allclose(next(model.rounds(sketches, 0, start)), heed_outlines(mean, sketches), rtol=1e-5)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -34,8 +34,8 @@ class Oracle:
     def __init__(self, examples: list[Example]) -> None:
         self.truth = {camera.packed.tobytes(): e.frustum(i) for e in examples for i, camera in enumerate(e.cameras)}
 
-    def first_prediction(self, sketches: Sketches) -> Volume:
-        return next(self.rounds(sketches, 0))
+    def first_predictions(self, samples: Sequence[Sketches]) -> Iterator[Volume]:
+        return (next(self.rounds(sketches, 0)) for sketches in samples)
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         blank = np.full((64, 64, 64), 0.1, np.float32)
@@ -73,12 +73,13 @@ class Carver:
 
     device = torch.device("cpu")
 
-    def first_prediction(self, sketches: Sketches) -> Volume:
-        cameras = [sk.Camera.from_packed(row) for row in sketches.cameras]
-        return sk.carve(sketches.drawings, cameras).astype(np.float32)
+    def first_predictions(self, samples: Sequence[Sketches]) -> Iterator[Volume]:
+        for sketches in samples:
+            cameras = [sk.Camera.from_packed(row) for row in sketches.cameras]
+            yield sk.carve(sketches.drawings, cameras).astype(np.float32)
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
-        yield self.first_prediction(sketches)  # nothing changes afterwards: it stops at once
+        yield from self.first_predictions([sketches])  # nothing changes afterwards: it stops at once
 
 
 def test_carving_leaves_no_concavity_empty_and_its_early_stop_counts_for_all_rounds() -> None:

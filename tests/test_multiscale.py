@@ -125,7 +125,7 @@ def test_only_the_first_drawing_counts_and_rounds_change_nothing() -> None:
     volumes = list(model.rounds(sketches, 4))
     assert len(volumes) == 5
     for volume in volumes:
-        np.testing.assert_array_equal(volume, model.first_prediction(first))
+        np.testing.assert_array_equal(volume, next(model.first_predictions([first])))
     in_camera = model.predict(sketches.drawings[:1])[0]
     np.testing.assert_array_equal(volumes[0], sk.to_world_grid(in_camera, batch.cameras[0][0]))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 from PIL import Image
 
 import sketchcore as sk
+from sketchcore.evaluate.testset import load_testset
+from sketchcore.rounds import crossing
 
 SHAPE = sk.Shape([sk.Cuboid((0, -0.2, 0), (0.35, 0.15, 0.25)), sk.Cuboid((-0.25, 0.1, 0), (0.1, 0.3, 0.25))])
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -70,6 +73,37 @@ def test_progress_sees_every_round(drawing: np.ndarray) -> None:
     assert seen == [(0, 2), (1, 2), (2, 2)]
 
 
+def test_rounds_stop_when_the_solid_has_settled(drawing: np.ndarray) -> None:
+    volumes: list[np.ndarray] = []
+    to_the_end = sk.reconstruct(drawing, "quarter-037", tolerance=0.0, progress=lambda *call: volumes.append(call[2]))
+    assert len(to_the_end.trace) == len(volumes) - 1 == 5
+    np.testing.assert_array_equal(to_the_end.probability, volumes[-1])
+    changes = [np.sqrt(np.mean((b - a) ** 2)) for a, b in itertools.pairwise(volumes)]
+    np.testing.assert_allclose(to_the_end.trace, changes, rtol=1e-5)
+    sides = [crossing(a, b) for a, b in itertools.pairwise(volumes)]
+    for tolerance in (*sorted(sides), 1.5 * max(sides)):
+        seen: list[tuple[int, int]] = []
+        made = sk.reconstruct(
+            drawing, "quarter-037", tolerance=tolerance, progress=lambda r, n, _, seen=seen: seen.append((r, n))
+        )
+        last = next((r for r in range(2, 6) if sides[r - 1] < tolerance), 5)
+        assert seen == [(r, 5) for r in range(last + 1)]
+        np.testing.assert_allclose(made.trace, to_the_end.trace[:last])
+        np.testing.assert_array_equal(made.probability, volumes[last])
+
+
+def test_going_on_would_hardly_change_what_has_settled() -> None:
+    for example in load_testset(3):
+        for count in (1, 4):
+            drawings, cameras = list(example.drawings[:count]), example.cameras[:count]
+            settled = sk.reconstruct(drawings, cameras)
+            on_and_on = sk.reconstruct(drawings, cameras, tolerance=0.0)
+            assert 2 <= len(settled.trace) <= len(on_and_on.trace) == 5
+            assert sk.iou(settled.probability, on_and_on.probability) > 0.92
+            gained = sk.iou(on_and_on.probability, example.world) - sk.iou(settled.probability, example.world)
+            assert gained < 0.02
+
+
 def test_the_viewpoint_is_guessed_and_named(drawing: np.ndarray) -> None:
     made = sk.reconstruct(drawing, iterations=0)
     assert made.guessed in sk.QUARTER_VIEWS
@@ -126,6 +160,8 @@ def test_wrong_arguments_say_what_would_be_right(drawing: np.ndarray, tmp_path: 
         sk.reconstruct(drawing, [3])  # type: ignore[list-item]
     with pytest.raises(ValueError, match="iterations must be 0 or more"):
         sk.reconstruct(drawing, "front", iterations=-1)
+    with pytest.raises(ValueError, match="tolerance must be 0 or more, got nan"):
+        sk.reconstruct(drawing, "front", tolerance=float("nan"))
     with pytest.raises(FileNotFoundError):
         sk.reconstruct(tmp_path / "none.png", "front")
     with pytest.raises(FileNotFoundError):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import sketchcore as sk
 from sketchcore.camera import pack_cameras
 from sketchcore.nets.sketches import Sketches
-from sketchcore.rounds import Volume, update_rounds, visit
+from sketchcore.rounds import Volume, crossing, update_rounds, visit
 from sketchcore.viewpoint import guess_camera, guess_viewpoint
 
 VIEWS = ["quarter-037", "front", "top"]
@@ -36,8 +36,8 @@ class Oracle:
 
     device = torch.device("cpu")
 
-    def first_prediction(self, sketches: Sketches) -> Volume:
-        return next(self.rounds(sketches, 0))
+    def first_predictions(self, samples: Sequence[Sketches]) -> Iterator[Volume]:
+        return (next(self.rounds(sketches, 0)) for sketches in samples)
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         return update_rounds(lambda view, prior: self.answer(sketches, view), sketches.cameras, iterations, start)
@@ -110,3 +110,15 @@ def test_a_drawing_from_beside_a_viewpoint_is_traced_to_its_camera() -> None:
     azimuth = np.degrees(np.arctan2(*sk.VIEWPOINTS["quarter-307"].position[[2, 0]]))
     camera = sk.Camera.orbit(azimuth - 10, 22, fov_degrees=30)
     assert guess_camera(Oracle(), sk.draw(SHAPE, camera)) == ("quarter-307", camera)
+
+
+def test_what_crosses_is_counted_against_what_is_occupied() -> None:
+    before = np.zeros((64, 64, 64), np.float32)
+    before[:10, 0, 0] = 0.6
+    after = before.copy()
+    after[:2, 0, 0] = 0.5  # one half is outside
+    after[20, 0, 0] = 0.51
+    after[30, 0, 0] = 0.5
+    assert crossing(before, after) == pytest.approx(3 / 9)
+    assert crossing(before, before) == 0
+    assert crossing(before, np.zeros_like(before)) == 10, "of nothing, as of one voxel"

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageOps
-from skimage.filters import apply_hysteresis_threshold, gaussian, median
-from skimage.measure import label, regionprops
-from skimage.morphology import isotropic_dilation, skeletonize
 
 from sketchcore.grids import IMAGE, as_drawings
+
+# scikit-image is imported by what needs it: half a second, and clean drawings do without.
 
 Grey = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -205,6 +204,8 @@ def _clean(grey: Grey) -> NDArray[np.uint8] | None:
 
 def _paper(grey: Grey) -> Grey:
     """What the picture would be without ink: wide medians on a coarse grid (lines are few in each)."""
+    from skimage.filters import median
+
     height, width = grey.shape
     size = [max(1, round(64 * n / max(grey.shape))) for n in (width, height)]
     coarse = np.asarray(Image.fromarray(grey).resize(size, Image.Resampling.BOX))
@@ -218,6 +219,9 @@ def _paper(grey: Grey) -> Grey:
 
 def _ink(grey: Grey) -> tuple[Grey, Mask]:
     """Ink from 0 to 1, and where it is more than noise and specks."""
+    from skimage.filters import apply_hysteresis_threshold
+    from skimage.measure import label, regionprops
+
     contrast = grey - _paper(grey)
     if (contrast.astype(np.float64) ** 3).sum() < 0:  # ink is the rare extreme
         contrast = -contrast
@@ -264,12 +268,17 @@ def _resized(frame: Image.Image, side: int) -> Grey:
 
 
 def _width(mask: Mask) -> float:
+    from skimage.morphology import skeletonize
+
     length = int(np.count_nonzero(skeletonize(mask)))
     return int(np.count_nonzero(mask)) / max(1, length)
 
 
 def _lines(frame: Image.Image) -> NDArray[np.uint8]:
     """The drawing of a square of ink, its lines of a trained width."""
+    from skimage.filters import gaussian
+    from skimage.morphology import isotropic_dilation, skeletonize
+
     fine = _resized(frame, IMAGE * _FINE)
     mask = fine > 0.4
     width = _width(mask) / _FINE

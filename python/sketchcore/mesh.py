@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike
-from skimage.measure import marching_cubes
 
 from sketchcore import _core
 from sketchcore.atomic import replacing
 from sketchcore.volume import as_probability
+
+# Imported by what needs them: half a second and 40 MB, and a reconstruction alone makes no mesh.
+if TYPE_CHECKING:
+    import trimesh
 
 MESH_SUFFIXES = (".glb", ".obj", ".stl", ".ply")
 """File formats that `save_mesh` writes."""
@@ -47,6 +50,9 @@ def extract_mesh(probability: ArrayLike, level: float = 0.5, smooth: bool = True
     Raises:
         ValueError: if no voxel is above the level, the level lies outside (0, 1), or the volume is none.
     """
+    import trimesh
+    from skimage.measure import marching_cubes
+
     volume = as_probability(probability)
     if not 0 < level < 1:
         raise ValueError(f"level must lie between 0 and 1, got {level}")

@@ -20,7 +20,7 @@ from sketchcore.mesh import MESH_SUFFIXES, extract_mesh, save_mesh
 from sketchcore.nets.models import Model, build_model
 from sketchcore.nets.sketches import Sketches
 from sketchcore.nets.weights import load_weights
-from sketchcore.rounds import Volume
+from sketchcore.rounds import TOLERANCE, Volume, until_settled
 from sketchcore.viewpoint import guess_camera
 from sketchcore.volume import load_binvox, load_npz, save_binvox, save_npz
 
@@ -39,7 +39,7 @@ class Reconstruction:
     Attributes:
         probability: float32 [64, 64, 64], world grid (x, y, z), probability of occupancy.
         views: the camera of each drawing.
-        trace: root-mean-square change of the probability in each round.
+        trace: root-mean-square change of the probability in each round that was run.
         drawings: uint8 [n, 256, 256], the drawings as the network saw them, ink 255 on 0.
         guessed: the name of the viewpoint that is nearest to the camera, where none was given.
     """
@@ -57,6 +57,7 @@ class Reconstruction:
         view: View,
         *,
         iterations: int = 5,
+        tolerance: float = TOLERANCE,
         model: ModelLike = None,
         progress: Progress | None = None,
     ) -> Reconstruction:
@@ -68,7 +69,8 @@ class Reconstruction:
         Args:
             drawing: as for `reconstruct`.
             view: the viewpoint's name, or the camera.
-            iterations: rounds over all drawings.
+            iterations: rounds over all drawings, at most.
+            tolerance: as for `reconstruct`.
             model: as for `reconstruct`; None for the one that this reconstruction was made with.
             progress: as for `reconstruct`.
         """
@@ -79,6 +81,7 @@ class Reconstruction:
             drawings,
             views,
             iterations,
+            tolerance,
             load_model(model if model is not None else self._model),
             progress,
             start,
@@ -147,6 +150,7 @@ def reconstruct(
     views: View | Sequence[View] | None = None,
     *,
     iterations: int = 5,
+    tolerance: float = TOLERANCE,
     model: ModelLike = None,
     device: str | torch.device | None = None,
     progress: Progress | None = None,
@@ -162,11 +166,13 @@ def reconstruct(
         views: a viewpoint's name (`sketchcore.VIEWPOINTS`) or a `sketchcore.Camera` for each drawing; None, for a
             single drawing only, guesses among the eight three-quarter views, and the cameras near the best of them
             where its solid fills the outline poorly.
-        iterations: rounds over all drawings, 0 or more.
+        iterations: rounds over all drawings, 0 or more; fewer are run where the solid has settled.
+        tolerance: what that means: from the second round on, they stop once the voxels that were on the other side
+            of 0.5 a round before are fewer than this share of those that are occupied. At 0 they never stop early.
         model: None for the weights inside the package, a path to weights, or a loaded model (`load_model`).
         device: None for CUDA where there is one, else the CPU.
         progress: called as `progress(round, iterations, probability)` after the first prediction (round 0) and
-            after each round.
+            after each round that is run.
 
     Raises:
         ValueError: for no drawings, a number of views that differs from that of drawings, a drawing that is none.
@@ -180,6 +186,8 @@ def reconstruct(
         raise ValueError("reconstruct needs at least one drawing")
     if iterations < 0:
         raise ValueError(f"iterations must be 0 or more, got {iterations}")
+    if not tolerance >= 0:
+        raise ValueError(f"tolerance must be 0 or more, got {tolerance}")
     if views is None and len(sources) > 1:
         raise ValueError(f"{len(sources)} drawings need a view each; only a single drawing's view can be guessed")
     names = [views] if isinstance(views, str | Camera) else list(views or [])
@@ -189,29 +197,29 @@ def reconstruct(
     images = np.stack([load_drawing(source) for source in sources])
     chosen = load_model(model, device)
     guessed = None
-    guessed = None
     if not cameras:
         guessed, camera = guess_camera(chosen, images[0])
         cameras = (camera,)
-    return replace(_run(images, cameras, iterations, chosen, progress), guessed=guessed)
+    return replace(_run(images, cameras, iterations, tolerance, chosen, progress), guessed=guessed)
 
 
 def _run(
     drawings: NDArray[np.uint8],
     views: tuple[Camera, ...],
     iterations: int,
+    tolerance: float,
     model: Model,
     progress: Progress | None,
     start: Volume | None = None,
 ) -> Reconstruction:
     before: Volume | None = None
-    trace = []
+    trace: list[float] = []
     sketches = Sketches(drawings, pack_cameras(views))
-    for number, volume in enumerate(model.rounds(sketches, iterations, start)):
-        if before is not None:
-            trace.append(float(np.sqrt(np.mean((volume - before) ** 2))))
+    for number, volume in enumerate(until_settled(model.rounds(sketches, iterations, start), tolerance)):
         if progress is not None:
             progress(number, iterations, volume)
+        if before is not None:
+            trace.append(float(np.sqrt(np.mean((volume - before) ** 2))))
         before = volume
     assert before is not None
     return Reconstruction(before, views, tuple(trace), drawings, _model=model)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,17 +57,18 @@ def guess_camera(model: Model, drawing: NDArray[np.uint8]) -> tuple[str, Camera]
         position = VIEWPOINTS[near].position
         azimuth = math.degrees(math.atan2(position[2], position[0]))
         for turn, elevation, fov in itertools.product(_TURNS, _ELEVATIONS, _FIELDS_OF_VIEW):
-            camera = Camera.orbit(azimuth + turn, elevation, fov_degrees=fov)
-            tried.append((_plausibility(model, drawing, camera), near, camera))
-    best, near, camera = max(tried, key=lambda one: one[0])
+            tried.append((near, Camera.orbit(azimuth + turn, elevation, fov_degrees=fov)))
+    fills = _plausibilities(model, drawing, [camera for _, camera in tried])
+    best, (near, camera) = max(zip(fills, tried, strict=True), key=lambda one: one[0])
     return (near, camera) if best > fill + _GAIN else (name, VIEWPOINTS[name])
 
 
 def _ranked(model: Model, drawing: NDArray[np.uint8]) -> list[tuple[float, str]]:
-    fills = [(_plausibility(model, drawing, VIEWPOINTS[name]), name) for name in QUARTER_VIEWS]
-    return sorted(fills, key=lambda one: one[0], reverse=True)
+    fills = _plausibilities(model, drawing, [VIEWPOINTS[name] for name in QUARTER_VIEWS])
+    return sorted(zip(fills, QUARTER_VIEWS, strict=True), key=lambda one: one[0], reverse=True)
 
 
-def _plausibility(model: Model, drawing: NDArray[np.uint8], camera: Camera) -> float:
-    volume = model.first_prediction(Sketches(drawing[None], pack_cameras([camera])))
-    return outline_iou(volume, camera, drawing)
+def _plausibilities(model: Model, drawing: NDArray[np.uint8], cameras: Sequence[Camera]) -> list[float]:
+    sketches = Sketches(drawing[None], pack_cameras(cameras[:1]))
+    volumes = model.first_predictions([sketches.seen_by(pack_cameras([camera])) for camera in cameras])
+    return [outline_iou(volume, camera, drawing) for volume, camera in zip(volumes, cameras, strict=True)]

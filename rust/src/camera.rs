@@ -80,6 +80,7 @@ impl Camera {
     }
 
     /// World to camera coordinates.
+    #[inline(always)]
     pub fn to_camera(&self, point: DVec3) -> DVec3 {
         let p = point - self.position;
         DVec3::new(self.axes[0].dot(p), self.axes[1].dot(p), self.axes[2].dot(p))

@@ -6,7 +6,9 @@
 //! its own place, and at its mirror image's.
 
 use crate::camera::Camera;
+use crate::dispatch::for_each_instruction_set;
 use glam::DVec3;
+use std::ops::Range;
 
 /// Pixels along each side of the feature volume.
 pub const PLANE: usize = 64;
@@ -25,26 +27,48 @@ pub const TAPS: usize = 8;
 /// the image.
 type Taps = [(usize, f32); TAPS];
 
-/// Reads a feature volume, `PLANE`^2 x `BINS` x `width`, at every cell: `HALF` x 2 x `width`, own place then
-/// mirror image.
-pub fn read(camera: &Camera, features: &[f32], width: usize, out: &mut [f32]) {
+/// Reads a feature volume, `PLANE`^2 x `BINS` x `width`, at the cells of as many planes x = `first`, `first` + 1, ...
+/// as `out` has room for: (`COARSE`^2 / 2) x 2 x `width` each, own place then mirror image.
+pub fn read(camera: &Camera, features: &[f32], width: usize, first: usize, out: &mut [f32]) {
     assert_eq!(features.len(), ENTRIES * width);
-    assert_eq!(out.len(), 2 * HALF * width);
-    for_each_reading(camera, |reading, taps| {
-        let out = &mut out[reading * width..][..width];
-        out.fill(0.0);
+    assert_eq!(out.len() % (HALF / COARSE * 2 * width), 0);
+    let planes = first..first + out.len() / (HALF / COARSE * 2 * width);
+    assert!(planes.end <= COARSE);
+    read_planes(camera, features, width, planes, out);
+}
+
+/// Features that are summed side by side: a vector of AVX-512.
+const LANES: usize = 16;
+
+for_each_instruction_set! {
+fn read_planes(camera: &Camera, features: &[f32], width: usize, planes: Range<usize>, out: &mut [f32]) {
+    for_each_reading(camera, planes, |reading, taps| {
+        let (lanes, rest) = out[reading * width..][..width].as_chunks_mut::<LANES>();
+        for (i, out) in lanes.iter_mut().enumerate() {
+            let mut sum = [0.0; LANES];
+            for (row, weight) in taps {
+                let feature: &[f32; LANES] = features[row * width + i * LANES..].first_chunk().expect("a row");
+                for lane in 0..LANES {
+                    sum[lane] += weight * feature[lane];
+                }
+            }
+            *out = sum;
+        }
+        let done = width - rest.len();
+        rest.fill(0.0);
         for (row, weight) in taps {
-            let feature = &features[row * width..][..width];
-            out.iter_mut().zip(feature).for_each(|(o, f)| *o += weight * f);
+            let feature = &features[row * width..][done..width];
+            rest.iter_mut().zip(feature).for_each(|(o, f)| *o += weight * f);
         }
     });
+}
 }
 
 /// The transpose of `read`: adds every cell's gradient to the entries that it was read from.
 pub fn read_transposed(camera: &Camera, gradient: &[f32], width: usize, out: &mut [f32]) {
     assert_eq!(out.len(), ENTRIES * width);
     assert_eq!(gradient.len(), 2 * HALF * width);
-    for_each_reading(camera, |reading, taps| {
+    for_each_reading(camera, 0..COARSE, |reading, taps| {
         let gradient = &gradient[reading * width..][..width];
         for (row, weight) in taps {
             let out = &mut out[row * width..][..width];
@@ -57,7 +81,7 @@ pub fn read_transposed(camera: &Camera, gradient: &[f32], width: usize, out: &mu
 pub fn fill_taps(camera: &Camera, rows: &mut [i32], weights: &mut [f32]) {
     assert_eq!(rows.len(), 2 * HALF * TAPS);
     assert_eq!(weights.len(), rows.len());
-    for_each_reading(camera, |reading, taps| {
+    for_each_reading(camera, 0..COARSE, |reading, taps| {
         for (i, (row, weight)) in taps.into_iter().enumerate() {
             rows[reading * TAPS + i] = row as i32;
             weights[reading * TAPS + i] = weight;
@@ -65,11 +89,12 @@ pub fn fill_taps(camera: &Camera, rows: &mut [i32], weights: &mut [f32]) {
     });
 }
 
-fn for_each_reading(camera: &Camera, mut visit: impl FnMut(usize, Taps)) {
+#[inline(always)]
+fn for_each_reading(camera: &Camera, planes: Range<usize>, mut visit: impl FnMut(usize, Taps)) {
     let at = |i: usize| (i as f64 + 0.5) / COARSE as f64 - 0.5;
     let along_z = camera.to_camera(camera.position + DVec3::Z);
     let mut reading = 0;
-    for x in 0..COARSE {
+    for x in planes {
         for y in 0..COARSE {
             let foot = camera.to_camera(DVec3::new(at(x), at(y), 0.0));
             for z in COARSE / 2..COARSE {
@@ -83,6 +108,7 @@ fn for_each_reading(camera: &Camera, mut visit: impl FnMut(usize, Taps)) {
 }
 
 /// The entries around a point in camera coordinates.
+#[inline(always)]
 fn taps(camera: &Camera, p: DVec3) -> Taps {
     if p.z <= 0.0 {
         return [(0, 0.0); TAPS];
@@ -100,6 +126,7 @@ fn taps(camera: &Camera, p: DVec3) -> Taps {
 }
 
 /// The two of `count` places around `at`, and their shares; a place that does not exist has none, and stands for 0.
+#[inline(always)]
 fn pair(at: f64, count: usize) -> ([usize; 2], [f32; 2]) {
     let low = at.floor();
     let share = at - low;
@@ -127,7 +154,7 @@ mod tests {
     /// Own and mirrored reading of the cell (x, y, z) of the half grid.
     fn reading(camera: &Camera, features: &[f32], [x, y, z]: [usize; 3]) -> [f32; 2] {
         let mut out = vec![9.0; 2 * HALF];
-        read(camera, features, 1, &mut out);
+        read(camera, features, 1, 0, &mut out);
         out.as_chunks().0[(x * COARSE + y) * COARSE / 2 + z]
     }
 
@@ -173,7 +200,7 @@ mod tests {
         for (azimuth, elevation) in VIEWPOINTS {
             let camera = Camera::orbit(azimuth, elevation, 0.1, DISTANCE);
             let (mut there, mut back) = (vec![0.0; 4 * HALF], vec![0.0; 2 * ENTRIES]);
-            read(&camera, &features, 2, &mut there);
+            read(&camera, &features, 2, 0, &mut there);
             read_transposed(&camera, &gradient, 2, &mut back);
             let (a, b) = (dot(&there, &gradient), dot(&features, &back));
             assert!((a - b).abs() < 1e-2, "{a} {b}");
@@ -187,7 +214,7 @@ mod tests {
         fill_taps(&camera, &mut rows, &mut weights);
         let features = volume(|row, col, depth| (row * 0.9 + col * 0.4 + depth).sin());
         let mut out = vec![0.0; 2 * HALF];
-        read(&camera, &features, 1, &mut out);
+        read(&camera, &features, 1, 0, &mut out);
         let taps = rows.as_chunks::<TAPS>().0.iter().zip(weights.as_chunks::<TAPS>().0);
         for ((rows, weights), got) in taps.zip(out) {
             let sum: f32 = rows.iter().zip(weights).map(|(&r, w)| w * features[r as usize]).sum();

@@ -16,6 +16,7 @@ from sketchcore.evaluate.testset import Example, load_testset
 from sketchcore.grids import carve, to_world_grid
 from sketchcore.nets.models import Model
 from sketchcore.nets.sketches import Sketches
+from sketchcore.rounds import TOLERANCE, until_settled
 from sketchcore.viewpoint import guess_viewpoint
 from sketchcore.volume import iou
 
@@ -104,12 +105,15 @@ def measure_accuracy(
     )
 
 
-def predictions(model: Model, example: Example, views: int, rounds: int) -> list[NDArray[np.float32]]:
+def predictions(
+    model: Model, example: Example, views: int, rounds: int, tolerance: float = TOLERANCE
+) -> list[NDArray[np.float32]]:
     """The volumes of an example's first drawings: the first prediction, then each round's.
 
-    Where a model stops early, its last volume stands for the rounds that it saved.
+    Where rounds end early, because the solid has settled, their last volume stands for those that were saved.
     """
-    made = list(model.rounds(Sketches(example.drawings[:views], pack_cameras(example.cameras[:views])), rounds))
+    sketches = Sketches(example.drawings[:views], pack_cameras(example.cameras[:views]))
+    made = list(until_settled(model.rounds(sketches, rounds), tolerance))
     return made + [made[-1]] * (rounds + 1 - len(made))
 
 

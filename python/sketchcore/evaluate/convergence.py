@@ -49,7 +49,7 @@ class Convergence:
 def measure_convergence(
     model: Model, shapes: int | None = 100, progress: Callable[[int, int], None] | None = None
 ) -> Convergence:
-    """Ten rounds over one to four drawings of the fixed test set, and several orders of them (paper, section 6.4).
+    """Ten rounds, none saved, over one to four drawings of the fixed test set, and several orders of them (paper, section 6.4).
 
     Args:
         model: the network.
@@ -65,7 +65,7 @@ def measure_convergence(
     orders = np.empty((len(examples), VIEWS - 1))
     for i, example in enumerate(examples):
         for v in range(VIEWS):
-            volumes = predictions(model, example, v + 1, MANY_ROUNDS)
+            volumes = predictions(model, example, v + 1, MANY_ROUNDS, tolerance=0)
             network[i, v] = [iou(volume, example.world) for volume in volumes]
             change[i, v] = [float(np.linalg.norm(b - a)) for a, b in itertools.pairwise(volumes)]
             if v > 0:

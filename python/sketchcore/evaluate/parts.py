@@ -16,6 +16,7 @@ from sketchcore.atomic import replacing
 from sketchcore.evaluate import present
 from sketchcore.evaluate.accuracy import measure_accuracy
 from sketchcore.evaluate.convergence import measure_convergence
+from sketchcore.evaluate.cost import cost_as_table, measure_cost
 from sketchcore.evaluate.drawings import measure_drawings
 from sketchcore.evaluate.plots import plot_accuracy, plot_convergence, plot_robustness
 from sketchcore.evaluate.robustness import measure_robustness
@@ -44,6 +45,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
         "accuracy": Part(measure_accuracy, present.accuracy_table, plot_accuracy),
         "convergence": Part(measure_convergence, present.convergence_table, plot_convergence),
         "robustness": Part(measure_robustness, present.robustness_table, plot_robustness),
+        "cost": Part(measure_cost, cost_as_table, by_shapes=False),
         "drawings": Part(measure_drawings, present.drawings_table, by_shapes=False),
     }
 )
@@ -79,6 +81,10 @@ def measure_part(
             raise ValueError(f"{name} is measured on the fixed test set; --drawings goes with the part drawings")
         count = {} if shapes is None else {"shapes": shapes}
         return part.measure(load_model(weights), progress=progress, **count)
+    if name == "cost":
+        if folders or shapes is not None:
+            raise ValueError("cost takes no --drawings and no --shapes")
+        return part.measure(weights)
     if not folders or shapes is not None:
         raise ValueError(f"{name} takes one or more --drawings FOLDER, and no --shapes")
     return part.measure(load_model(weights), folders, out, progress)

@@ -15,6 +15,7 @@ from sketchcore.evaluate.figure import Figure
 from sketchcore.evaluate.testset import Example, load_testset
 from sketchcore.nets.models import Model
 from sketchcore.nets.sketches import Sketches
+from sketchcore.rounds import until_settled
 from sketchcore.volume import iou
 
 COUNTS = (1, VIEWS)
@@ -87,6 +88,6 @@ def _scores(model: Model, example: Example, faults: dict[str, int], seed: int) -
     )
     scores = []
     for count in COUNTS:
-        *_, volume = model.rounds(Sketches(drawings[:count], cameras[:count]), ROUNDS)
+        *_, volume = until_settled(model.rounds(Sketches(drawings[:count], cameras[:count]), ROUNDS))
         scores.append(iou(volume, example.world))
     return scores

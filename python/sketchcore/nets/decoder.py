@@ -63,13 +63,27 @@ class WorldDecoder(nn.Module):
         place = self.place.expand(len(readings), -1, -1, -1, -1)
         parts = [readings, fold(evidence), fold(prior[:, None]), place]
         x = torch.cat([part.to(readings.dtype) for part in parts], dim=-1).permute(0, 4, 1, 2, 3)
-        x32 = self.encode32(self.into(x), code)
+        return unfold(self.fuse(self.into(x), self.shortcut(x), code).float())
+
+    def fuse(self, x: Tensor, shortcut: Tensor, code: Tensor) -> Tensor:
+        """All but the first layers and the last rearrangement.
+
+        Args:
+            x: float [B, width, 32, 32, 16], what `into` makes of all inputs.
+            shortcut: float [B, 8, 32, 32, 16], what `shortcut` makes of them.
+            code: float [B, 32], what `condition` makes of the condition.
+
+        Returns:
+            float [B, 8, 32, 32, 16], logits of the occupancy of each cell's eight voxels.
+        """
+        x32 = self.encode32(x, code)
         x16 = self.encode16(self.down16(F.relu(x32)), code)
         x8 = self.encode8(self.down8(F.relu(x16)), code)
         x8 = self.decode8(self.attention(x8), code)
         y16 = self.decode16(x16 + twice(self.up16(F.relu(x8))), code)
         y32 = self.decode32(x32 + twice(self.up32(F.relu(y16))), code)
-        return unfold((self.out(F.relu(y32)) + self.shortcut(x)).float())
+        out: Tensor = self.out(F.relu(y32)) + shortcut
+        return out
 
 
 def fold(volume: Tensor) -> Tensor:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import reduce
 from typing import Any, Protocol
 
@@ -10,8 +10,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
+from torch.overrides import TorchFunctionMode
 
-from sketchcore.nets.compact import CompactConfig, CompactNet, read_inputs
+from sketchcore.nets.compact import CompactConfig, CompactNet
+from sketchcore.nets.decoder import fold
+from sketchcore.nets.inference import CompactInference, flip_cells, whole
 from sketchcore.nets.multiscale import MultiscaleNet
 from sketchcore.nets.outlines import heed_outlines
 from sketchcore.nets.pieces import join_pieces
@@ -31,8 +34,11 @@ class Model(Protocol):
 
     device: torch.device
 
-    def first_prediction(self, sketches: Sketches) -> Volume:
-        """float32 [64, 64, 64] (x, y, z), probability of occupancy as the network says it: with nothing mended yet."""
+    def first_predictions(self, samples: Sequence[Sketches]) -> Iterator[Volume]:
+        """Yields float32 [64, 64, 64] (x, y, z), probability of occupancy, for the drawings of each object.
+
+        It is what the network says, with nothing mended yet.
+        """
         ...
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
@@ -43,8 +49,10 @@ class Model(Protocol):
         ...
 
 
-LOOKS: tuple[tuple[int, ...], ...] = ((), (2,), (0,), (0, 2))
-"""Axes that the world is mirrored along in each of four rounds, over and over."""
+LOOKS: tuple[tuple[int, ...], ...] = ((), (0,), (2,), (0, 2))
+"""Axes that the world is mirrored along in each of four rounds, over and over: what differs most comes first."""
+BATCH = 8
+"""Objects that first predictions are made of side by side."""
 
 
 class CompactModel:
@@ -58,45 +66,38 @@ class CompactModel:
     """
 
     def __init__(self, net: CompactNet, device: torch.device) -> None:
-        self.net = place(net, device).eval()
+        self.net = CompactInference(net, device)
         self.device = device
 
-    def first_prediction(self, sketches: Sketches) -> Volume:
-        evidence = unit(sketches.evidence[None], self.device)
-        return _whole(self._decide(self._read(sketches), evidence, None, len(sketches), flip=False))
+    def first_predictions(self, samples: Sequence[Sketches]) -> Iterator[Volume]:
+        for first in range(0, len(samples), BATCH):
+            batch = samples[first : first + BATCH]
+            readings = self.net.read(batch, self.net.evidence(batch))
+            for cells in self.net.decide(readings, None, [len(s) for s in batch]):
+                yield whole(cells[None])
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         answers: dict[tuple[int, ...] | None, Tensor] = {}
         mean: Tensor | None = None
         if start is not None:
             half = 0.5 * (start + start[:, :, ::-1])[:, :, 32:]
-            mean = answers[None] = torch.from_numpy(np.ascontiguousarray(half, np.float32)).to(self.device)[None]
-        evidence = unit(sketches.evidence[None], self.device)
+            mean = fold(torch.from_numpy(np.ascontiguousarray(half, np.float32)).to(self.device)[None, None])
+            answers[None] = mean
+        evidence = self.net.evidence([sketches])
         readings: dict[tuple[int, ...], Tensor] = {}
         for number in range(iterations + 1):
             look = LOOKS[number % len(LOOKS)]
+            turn = flip_cells if 0 in look else _as_it_is
             if look not in readings:
-                readings[look] = self._read(reduce(Sketches.mirrored, look, sketches))
-            answers[look] = self._decide(readings[look], evidence, mean, len(sketches), flip=0 in look)
+                readings[look] = self.net.read([reduce(Sketches.mirrored, look, sketches)], turn(evidence))
+            prior = None if mean is None else turn(mean)
+            answers[look] = turn(self.net.decide(readings[look], prior, [len(sketches)]))
             mean = torch.stack([*answers.values()]).mean(dim=0)
-            yield join_pieces(heed_outlines(_whole(mean), sketches))
+            yield join_pieces(heed_outlines(whole(mean), sketches))
 
-    @torch.inference_mode()
-    def _read(self, sketches: Sketches) -> Tensor:
-        with autocast(self.device):
-            return self.net.read(**read_inputs([sketches], self.device))
 
-    @torch.inference_mode()
-    def _decide(self, readings: Tensor, evidence: Tensor, prior: Tensor | None, count: int, flip: bool) -> Tensor:
-        """Occupancy, float [1, 64, 64, 32]; with `flip`, the readings are of a world mirrored along x."""
-        has_prior = torch.full((1,), float(prior is not None), device=self.device)
-        known = torch.zeros_like(evidence[:, 0]) if prior is None else prior
-        if flip:
-            evidence, known = evidence.flip(2), known.flip(1)
-        with autocast(self.device):
-            logits = self.net.decide(readings, evidence, known, has_prior, [count])
-        probability = logits.float().sigmoid()
-        return probability.flip(1) if flip else probability
+def _as_it_is(cells: Tensor) -> Tensor:
+    return cells
 
 
 class PaperModel:
@@ -107,8 +108,9 @@ class PaperModel:
         self.updater = None if updater is None else place(updater, device).eval()
         self.device = device
 
-    def first_prediction(self, sketches: Sketches) -> Volume:
-        return next(self.rounds(sketches, 0))
+    def first_predictions(self, samples: Sequence[Sketches]) -> Iterator[Volume]:
+        for sketches in samples:
+            yield next(self.rounds(sketches, 0))
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         return update_rounds(
@@ -130,17 +132,8 @@ class PaperModel:
                 raise ValueError("these weights hold the single-view network alone; train the updater as well")
             else:
                 logits = self.updater(image, torch.from_numpy(prior).to(self.device)[None])
-        return _array(PaperNet.probability(logits.float())[0])
-
-
-def _whole(half: Tensor) -> Volume:
-    """Both halves of a symmetric volume, from the one with z > 0: [1, 64, 64, 32]."""
-    return _array(torch.cat([half.flip(3), half], dim=3)[0])
-
-
-def _array(tensor: Tensor) -> Volume:
-    array: Volume = tensor.contiguous().cpu().numpy()
-    return array
+        volume: Volume = PaperNet.probability(logits.float())[0].contiguous().cpu().numpy()
+        return volume
 
 
 def build_model(
@@ -156,7 +149,8 @@ def build_model(
     if kind == "compact":
         tuples: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in options.items()}
         try:
-            net = CompactNet(CompactConfig(**tuples))
+            with _Unfilled():
+                net = CompactNet(CompactConfig(**tuples))
         except TypeError as error:
             raise ValueError(f"the config is of another version of the network 'compact': {error}") from error
         _fill(net, state)
@@ -179,8 +173,21 @@ def build_model(
     raise ValueError(f"unknown network {kind!r} in the config; 'compact', 'paper' and 'multiscale' are known")
 
 
+class _Unfilled(TorchFunctionMode):
+    """Networks are made without their random beginnings: memory that is never written to takes no room."""
+
+    def __torch_function__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
+        if func in _FILLS or getattr(func, "__module__", None) == "torch.nn.init":
+            return args[0] if args else kwargs["tensor"]
+        return func(*args, **(kwargs or {}))
+
+
+_FILLS = {Tensor.uniform_, Tensor.normal_, Tensor.zero_, Tensor.fill_}
+
+
 def _fill(net: nn.Module, state: dict[str, Tensor]) -> None:
+    """Gives a network its weights: these very tensors, which are not copied."""
     try:
-        net.load_state_dict(state)
+        net.load_state_dict(state, assign=True)
     except RuntimeError as error:
         raise ValueError(f"the weights do not fit the network of their config: {error}") from error

@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, binary_erosion, label
-from skimage.graph import MCP
 
 from sketchcore.rounds import Volume
 
@@ -53,6 +52,8 @@ def join_pieces(volume: Volume) -> Volume:
 
 
 def _bridges(volume: Volume, labels: NDArray[np.int32], largest: int, others: list[int]) -> NDArray[np.bool_]:
+    from skimage.graph import MCP  # few solids need it
+
     possible = volume > LEAST
     # Improbable voxels cost most; through the solid a path is almost free, but not endless. Others are closed: -1.
     cost = np.where(possible, np.maximum(0.5 - volume, 0) + 0.01, -1)

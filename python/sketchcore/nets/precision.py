@@ -37,6 +37,11 @@ def has_fast_bfloat16(device: torch.device) -> bool:
     return device.type == "cpu" and any(bool(getattr(torch.cpu, c, bool)()) for c in checks)
 
 
+def fast_dtype(device: torch.device) -> torch.dtype:
+    """The type in which convolutions are fastest: bfloat16 or float32."""
+    return torch.bfloat16 if has_fast_bfloat16(device) else torch.float32
+
+
 def autocast(device: torch.device, enabled: bool = True) -> torch.autocast:
     """A context in which convolutions run in bfloat16 where that is faster."""
     return torch.autocast(device.type, torch.bfloat16, enabled=enabled and has_fast_bfloat16(device))

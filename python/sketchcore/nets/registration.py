@@ -92,7 +92,8 @@ def origin(camera: Camera) -> NDArray[np.float64]:
     """float64 [2]: the pixel (x, y) at which a camera sees the world's origin."""
     right, down, away = -camera.rotation @ camera.position
     focal = IMAGE / 2 / np.tan(np.radians(camera.fov_degrees / 2))
-    return IMAGE / 2 - 0.5 + focal * np.array([right, down]) / away
+    at: NDArray[np.float64] = IMAGE / 2 - 0.5 + focal * np.array([right, down]) / away
+    return at
 
 
 def rotated(camera: Camera, degrees: NDArray[np.float64]) -> Camera:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import torch
@@ -28,8 +28,9 @@ class SingleViewModel:
         self.net = place(net, device).eval()
         self.device = device
 
-    def first_prediction(self, sketches: Sketches) -> Volume:
-        return next(self.rounds(sketches, 0))
+    def first_predictions(self, samples: Sequence[Sketches]) -> Iterator[Volume]:
+        for sketches in samples:
+            yield next(self.rounds(sketches, 0))
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         """Yields the same float32 [64, 64, 64] (x, y, z) for the first prediction and each round.

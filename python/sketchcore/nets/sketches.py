@@ -48,6 +48,12 @@ class Sketches:
         """uint8 [3, 64, 64, 32]: what all drawings say about each voxel of the half grid z > 0."""
         return _core.evidence(self.fields, self.cameras)
 
+    def seen_by(self, cameras: NDArray[np.float64]) -> Sketches:
+        """The same drawings, made by other cameras, float64 [n, 15]: what is known of them alone is kept."""
+        other = Sketches(self.drawings, cameras)
+        other.__dict__["fields"] = self.fields  # what `cached_property` looks up
+        return other
+
     def mirrored(self, axis: int) -> Sketches:
         """The object mirrored along a world axis (0 or 2 for x or z), as mirrored cameras see it."""
         return Sketches(np.ascontiguousarray(self.drawings[:, :, ::-1]), mirror_cameras(self.cameras, axis))

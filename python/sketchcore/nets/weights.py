@@ -13,7 +13,7 @@ from typing import Any
 
 import torch
 from safetensors import SafetensorError
-from safetensors.torch import load, save
+from safetensors.torch import load_file, save
 from torch import Tensor
 
 from sketchcore.atomic import write_atomically
@@ -91,11 +91,15 @@ def load_weights(path: str | os.PathLike[str]) -> tuple[dict[str, Tensor], dict[
     if not isinstance(config, dict):
         raise ValueError(f"config {config_path} must be a JSON object, got {type(config).__name__}")
     try:
-        stored: dict[str, Tensor] = load(path.read_bytes())
+        stored: dict[str, Tensor] = load_file(path)
     except SafetensorError as error:
         raise ValueError(f"weights {path} are truncated, corrupt or no safetensors file: {error}") from error
     _refuse_non_finite(stored, f"in {path}")
-    return {name: t.float() if t.is_floating_point() else t for name, t in stored.items()}, config
+    return {name: _widened(stored.pop(name)) for name in list(stored)}, config
+
+
+def _widened(tensor: Tensor) -> Tensor:
+    return tensor.float() if tensor.is_floating_point() else tensor
 
 
 def _checked(path: str | os.PathLike[str]) -> Path:

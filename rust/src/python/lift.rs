@@ -2,10 +2,13 @@
 
 use super::arrays::{cameras_of, checked, same_count};
 use crate::error::CoreError;
-use crate::lift::{ENTRIES, HALF, TAPS, fill_taps, read, read_transposed};
+use crate::lift::{COARSE, ENTRIES, HALF, TAPS, fill_taps, read, read_transposed};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
+
+/// Planes of cells that one thread reads at a time.
+const PLANES: usize = 4;
 
 #[pyfunction]
 pub fn lift<'py>(
@@ -19,8 +22,12 @@ pub fn lift<'py>(
     same_count("features", features.len() / (ENTRIES * width), cameras.len())?;
     let mut out = vec![0.0; cameras.len() * 2 * HALF * width];
     py.detach(|| {
-        let jobs = out.par_chunks_mut(2 * HALF * width).zip(features.par_chunks(ENTRIES * width));
-        jobs.zip(&cameras).for_each(|((out, features), camera)| read(camera, features, width, out));
+        // A drawing's planes are shared out as well: there may be one drawing alone.
+        out.par_chunks_mut(HALF / COARSE * PLANES * 2 * width).enumerate().for_each(|(job, out)| {
+            let (drawing, part) = (job / (COARSE / PLANES), job % (COARSE / PLANES));
+            let features = &features[drawing * ENTRIES * width..][..ENTRIES * width];
+            read(&cameras[drawing], features, width, part * PLANES, out);
+        });
     });
     PyArray1::from_vec(py, out).reshape(vec![cameras.len(), HALF, 2 * width])
 }

@@ -1,0 +1,105 @@
+"""What a reconstruction costs: time and memory, beside the paper's (its section 6.6)."""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+VIEWS = 4
+ROUNDS = 5
+PAPER = {"paper, TitanX": (140.0, 210.0, 280.0, 350.0), "paper, laptop CPU": (1000.0, 1500.0, 2200.0, 2900.0)}
+"""Milliseconds for one to four views and five rounds, as the paper reports them."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What `measure_cost` measured.
+
+    Attributes:
+        milliseconds: a reconstruction from one to four drawings with their views, at most five rounds: median.
+        rounds: how many of the five were run, before the solid had settled.
+        first_call: seconds from `import sketchcore` to the first solid, from one drawing, in a fresh process.
+        peak: megabytes (10^6 bytes) of memory that a process held at most, which did that and then all
+            reconstructions timed here: torch and the interpreter included.
+        threads: how many torch computed on.
+    """
+
+    milliseconds: tuple[float, ...]
+    rounds: tuple[int, ...]
+    first_call: float
+    peak: float
+    threads: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """The figures as plain data."""
+        return asdict(self)
+
+
+def measure_cost(model: str | os.PathLike[str] | None = None, repetitions: int = 15) -> Cost:
+    """Measures the shipped settings in a fresh process, on the test set's first shape.
+
+    Numbers of views take turns, so that what disturbs the machine disturbs all of them alike. Drawings are at hand as
+    arrays; the first reconstruction from each number of them is not timed.
+
+    Args:
+        model: weights; None for those inside the package.
+        repetitions: how often each number of views is timed, at least 1.
+
+    Raises:
+        ValueError: for a number of repetitions below 1.
+        FileNotFoundError: if there are no such weights.
+        RuntimeError: if the process fails otherwise, with what it printed.
+    """
+    if repetitions < 1:
+        raise ValueError(f"repetitions must be at least 1, got {repetitions}")
+    if model is not None and not Path(model).is_file():
+        raise FileNotFoundError(f"no weights at {os.fspath(model)}")
+    from sketchcore.evaluate.testset import load_testset
+
+    example = next(load_testset(1))
+    task = {
+        "model": None if model is None else str(Path(model).resolve()),
+        "repetitions": repetitions,
+        "drawings": example.drawings.tolist(),
+        "cameras": [camera.packed.tolist() for camera in example.cameras[:VIEWS]],
+    }
+    # The same package as this one, wherever it lies; and no other script beside it.
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    command = [sys.executable, "-P", str(Path(__file__).with_name("cost_process.py"))]
+    done = subprocess.run(command, input=json.dumps(task), capture_output=True, text=True, env=environment, check=False)
+    if done.returncode:
+        raise RuntimeError(f"the process that measures failed:\n{done.stderr.strip()}")
+    figures = json.loads(done.stdout)
+    return Cost(
+        milliseconds=tuple(1e3 * statistics.median(times) for times in figures["seconds"]),
+        rounds=tuple(figures["rounds"]),
+        first_call=figures["first_call"],
+        peak=figures["peak"] / 1e6,
+        threads=figures["threads"],
+    )
+
+
+def cost_as_table(cost: Cost) -> Table:
+    """Time by number of views, beside the paper's; first call and memory below."""
+    table = Table(title=f"Time of a reconstruction, at most {ROUNDS} rounds")
+    table.add_column("")
+    for n in range(1, VIEWS + 1):
+        table.add_column(f"{n} view{'s' if n > 1 else ''}", justify="right")
+    cores = f"{cost.threads} thread{'s' if cost.threads > 1 else ''}"
+    table.add_row(f"sketchcore, CPU, {cores}", *(f"{ms:.0f} ms" for ms in cost.milliseconds))
+    table.add_row("rounds until it settled", *map(str, cost.rounds))
+    for name, times in PAPER.items():
+        table.add_row(name, *(f"{ms:.0f} ms" for ms in times))
+    table.caption = (
+        f"first call {cost.first_call:.1f} s, imports and weights included; "
+        f"at most {cost.peak:.0f} MB of memory, torch included"
+    )
+    return table

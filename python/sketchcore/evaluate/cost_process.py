@@ -1,0 +1,60 @@
+"""The process that `cost.py` measures: run as a script, so that nothing is imported before its time counts."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+
+
+def main() -> None:
+    """Reads the task from stdin and writes the figures to stdout, JSON both."""
+    task = json.load(sys.stdin)
+    started = time.perf_counter()
+    import numpy as np  # what the package imports anyway
+
+    import sketchcore as sk
+
+    drawings = [np.array(drawing, np.uint8) for drawing in task["drawings"]]
+    cameras = [sk.Camera.from_packed(np.array(row)) for row in task["cameras"]]
+    model = sk.load_model(task["model"])
+    sk.reconstruct(drawings[:1], cameras[:1], model=model)
+    first_call = time.perf_counter() - started
+
+    counts = range(1, len(drawings) + 1)
+    seconds: list[list[float]] = [[] for _ in counts]
+    rounds = [len(sk.reconstruct(drawings[:n], cameras[:n], model=model).trace) for n in counts]
+    for _ in range(task["repetitions"]):
+        for n in counts:
+            begun = time.perf_counter()
+            sk.reconstruct(drawings[:n], cameras[:n], model=model)
+            seconds[n - 1].append(time.perf_counter() - begun)
+    import torch
+
+    figures = {
+        "first_call": first_call,
+        "seconds": seconds,
+        "rounds": rounds,
+        "peak": peak_memory(),
+        "threads": torch.get_num_threads(),
+    }
+    json.dump(figures, sys.stdout)
+
+
+def peak_memory() -> int:
+    """The most bytes of memory that this process has held.
+
+    On Linux as the kernel counts it since the process began: `getrusage` there starts from what its parent held.
+    """
+    try:
+        with open("/proc/self/status") as status:
+            [line] = (line for line in status if line.startswith("VmHWM:"))
+        return 1024 * int(line.split()[1])
+    except (FileNotFoundError, ValueError):
+        import resource
+
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+
+
+if __name__ == "__main__":
+    main()

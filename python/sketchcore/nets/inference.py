@@ -1,0 +1,118 @@
+"""`CompactNet` as a reconstruction runs it: weights cast and laid out once, and nothing computed twice.
+
+The first layer of the decoder is linear in what was read, in the evidence and in the prior. The prior alone changes
+from round to round, so what the layer makes of all else is kept. Volumes stay in the decoder's own layout, cells of two
+voxels a side, until they are handed out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from copy import deepcopy
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from sketchcore.nets.compact import CompactNet, read_inputs
+from sketchcore.nets.decoder import EVIDENCE, fold, unfold
+from sketchcore.nets.lift import COARSE, lift
+from sketchcore.nets.precision import fast_dtype, place, unit
+from sketchcore.nets.sketches import Sketches
+from sketchcore.rounds import Volume
+
+PAIR = 2
+"""Drawings that are encoded side by side: more are no faster, and each takes 10 MB meanwhile."""
+
+
+class CompactInference:
+    """A network whose weights no longer change. It answers as the network does, up to rounding.
+
+    Args:
+        net: the network; it stays as it is.
+        device: where to compute.
+    """
+
+    def __init__(self, net: CompactNet, device: torch.device) -> None:
+        self.device = device
+        self.dtype = fast_dtype(device)
+        cast = {id(p): nn.Parameter(p.detach().to(device, self.dtype), False) for p in net.parameters()}
+        self._net = place(deepcopy(net, cast), device).eval()
+        # Reading and what is kept are 1 % of the work: float32.
+        self._reading = [p.detach().to(device, torch.float32) for p in (net.reading.weight, net.reading.bias)]
+        layers = (net.decoder.into, net.decoder.shortcut)
+        weight = torch.cat([layer.weight.detach().flatten(1) for layer in layers]).to(device, torch.float32).t()
+        bias = torch.cat([layer.bias.detach() for layer in layers if layer.bias is not None])
+        self._seen, prior, where = torch.split(weight, [len(weight) - 8 - 3, 8, 3])
+        self._prior = prior.to(self.dtype)
+        places = net.decoder.place.detach().to(device, torch.float32).flatten(0, 2)
+        self._where = torch.addmm(bias.to(device, torch.float32), places, where)
+
+    @torch.inference_mode()
+    def evidence(self, samples: Sequence[Sketches]) -> Tensor:
+        """float32 [B, 32, 32, 16, 24] in 0..1, the evidence of each object's drawings; for `read`."""
+        volumes = [fold(torch.from_numpy(s.evidence)[None]) for s in samples]
+        return unit(torch.cat(volumes).numpy(), self.device)
+
+    @torch.inference_mode()
+    def read(self, samples: Sequence[Sketches], evidence: Tensor) -> Tensor:
+        """What does not change from round to round: the decoder's first layers, but for the prior.
+
+        Args:
+            samples: the drawings of each object.
+            evidence: float32 [B, 32, 32, 16, 24], from `evidence`.
+
+        Returns:
+            [B, 32 * 32 * 16, width of the decoder's first layer + 8].
+        """
+        inputs = read_inputs(samples, self.device)
+        cameras, counts = inputs["cameras"], inputs["counts"]
+        rotations = torch.from_numpy(cameras[:, 3:12]).to(self.device, self.dtype).view(-1, 3, 3)
+        drawings, fields = (inputs[name].to(self.dtype) for name in ("drawings", "fields"))
+        each = torch.empty(len(cameras), math.prod(COARSE), len(self._reading[1]), device=self.device)
+        for first in range(0, len(cameras), PAIR):
+            some = slice(first, first + PAIR)
+            features = self._net.encoder(drawings[some], fields[some], rotations[some])
+            each[some] = F.linear(lift(features, cameras[some]), *self._reading).relu_()
+        seen = torch.stack([torch.cat([e.mean(dim=0), e.amax(dim=0)], dim=-1) for e in torch.split(each, counts)])
+        known = torch.cat([seen, evidence.view(len(samples), -1, 8 * EVIDENCE)], dim=-1)
+        out: Tensor = (known @ self._seen + self._where).to(self.dtype)
+        return out
+
+    @torch.inference_mode()
+    def decide(self, readings: Tensor, prior: Tensor | None, counts: Sequence[int]) -> Tensor:
+        """Occupancy from what was read and a prior.
+
+        Args:
+            readings: from `read`.
+            prior: float [B, 32, 32, 16, 8], probability of occupancy of each cell's voxels (`fold`); None for none.
+            counts: drawings of each object.
+
+        Returns:
+            float32 [B, 32, 32, 16, 8], probability of occupancy.
+        """
+        decoder, batch = self._net.decoder, len(readings)
+        if prior is not None:
+            readings = readings + prior.to(self.dtype).view(batch, -1, 8) @ self._prior
+        x, shortcut = (
+            part.contiguous().view(batch, *COARSE, -1).permute(0, 4, 1, 2, 3)
+            for part in torch.split(readings, [readings.shape[-1] - 8, 8], dim=-1)
+        )
+        condition = [[float(prior is not None), count / 4] for count in counts]
+        code = decoder.condition(torch.tensor(condition, dtype=self.dtype, device=self.device))
+        probability: Tensor = decoder.fuse(x, shortcut, code).permute(0, 2, 3, 4, 1).float().sigmoid()
+        return probability
+
+
+def flip_cells(cells: Tensor) -> Tensor:
+    """Volumes in cells, [B, x, y, z, 8 * n] (`fold`), mirrored along x."""
+    parts = cells.view(*cells.shape[:4], -1, 2, 2, 2)
+    return parts.flip(1, 5).reshape(cells.shape)
+
+
+def whole(cells: Tensor) -> Volume:
+    """A symmetric volume, float32 [64, 64, 64] (x, y, z), from the cells of its half z > 0, [1, 32, 32, 16, 8]."""
+    half = unfold(cells.permute(0, 4, 1, 2, 3))[0]
+    array: Volume = torch.cat([half.flip(2), half], dim=2).cpu().numpy()
+    return array

@@ -1,0 +1,125 @@
+"""The compact network as a reconstruction runs it is the network that was trained."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+import sketchcore as sk
+from sketchcore.evaluate.testset import load_testset
+from sketchcore.nets import inference
+from sketchcore.nets.compact import CompactNet
+from sketchcore.nets.decoder import fold, unfold
+from sketchcore.nets.inference import CompactInference, flip_cells, whole
+from sketchcore.nets.models import BATCH, CompactModel
+from sketchcore.nets.sketches import Sketches
+from sketchcore.rounds import crossing
+from sketchcore.train.chains import Chain, compact_inputs
+from test_compact import CPU, TINY, awake, chains
+
+BOUNDS = {torch.float32: 1e-5, torch.bfloat16: 0.05}
+"""How far probabilities may be off: of 2^-24 and 2^-9 a rounding, through some forty layers."""
+
+
+def half(cells: torch.Tensor) -> torch.Tensor:
+    return unfold(cells.permute(0, 4, 1, 2, 3))
+
+
+def both(net: CompactNet, batch: list[Chain], dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch) -> list[np.ndarray]:
+    """Probabilities [B, 64, 64, 32] by the network itself in float32, and by its inference."""
+    with torch.inference_mode():
+        plain = net(**compact_inputs(batch, CPU)).sigmoid()
+    monkeypatch.setattr(inference, "fast_dtype", lambda device: dtype)
+    ours = CompactInference(net, CPU)
+    samples = [chain.sketches for chain in batch]
+    prior = fold(torch.from_numpy(np.stack([chain.prior for chain in batch]))[:, None])
+    readings = ours.read(samples, ours.evidence(samples))
+    cells = ours.decide(readings, prior if batch[0].depth else None, [len(s) for s in samples])
+    return [plain.numpy(), half(cells).numpy()]
+
+
+@pytest.mark.parametrize("dtype", BOUNDS)
+@pytest.mark.parametrize("depth", [0, 1])
+@pytest.mark.parametrize("counts", [(1,), (2, 1, 4)])
+def test_it_answers_as_the_network_does(
+    counts: tuple[int, ...], depth: int, dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain, ours = both(awake(CompactNet(TINY)), chains(counts, depth), dtype, monkeypatch)
+    assert plain.std() > 0.05, "a network that says the same everywhere shows nothing"
+    np.testing.assert_allclose(ours, plain, atol=BOUNDS[dtype])
+
+
+@pytest.mark.parametrize("dtype", BOUNDS)
+def test_the_weights_that_ship_lose_nothing(dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch) -> None:
+    from importlib.resources import files
+
+    from sketchcore.nets.weights import load_weights
+
+    state, _ = load_weights(str(files("sketchcore") / "pretrained" / "compact.safetensors"))
+    net = CompactNet()
+    net.load_state_dict(state)
+    plain, ours = both(net.eval(), chains((1, 3)), dtype, monkeypatch)
+    assert np.abs(plain - ours).mean() < 0.01 * BOUNDS[dtype] / 0.05
+    assert crossing(plain, ours) < 0.01
+
+
+def test_the_network_stays_as_it_is() -> None:
+    net = awake(CompactNet(TINY))
+    before = {name: value.clone() for name, value in net.state_dict().items()}
+    CompactInference(net, CPU)
+    assert all(p.requires_grad for p in net.parameters())
+    for name, value in net.state_dict().items():
+        assert value.dtype == torch.float32
+        torch.testing.assert_close(value, before[name], rtol=0, atol=0)
+
+
+def test_first_predictions_side_by_side_are_those_one_by_one() -> None:
+    model = CompactModel(awake(CompactNet(TINY)), CPU)
+    samples = [chain.sketches for chain in chains((1, 2) * (BATCH // 2) + (3,))]
+    together = list(model.first_predictions(samples))
+    assert len(together) == len(samples) > BATCH
+    for sketches, volume in zip(samples, together, strict=True):
+        assert (volume.shape, volume.dtype) == ((64, 64, 64), np.float32)
+        [alone] = model.first_predictions([sketches])
+        np.testing.assert_allclose(volume, alone, atol=BOUNDS[model.net.dtype])
+
+
+def test_cells_flip_as_volumes_do() -> None:
+    volumes = torch.rand(2, 3, 64, 64, 32)
+    torch.testing.assert_close(flip_cells(fold(volumes)), fold(volumes.flip(2)), rtol=0, atol=0)
+
+
+def test_cells_become_a_symmetric_volume() -> None:
+    volume = torch.rand(1, 64, 64, 32)
+    made = whole(fold(volume[:, None]))
+    np.testing.assert_array_equal(made[:, :, 32:], volume[0])
+    np.testing.assert_array_equal(made, made[:, :, ::-1])
+
+
+def test_drawings_seen_by_other_cameras_are_the_same_drawings() -> None:
+    example = next(load_testset(1))
+    sketches = Sketches(example.drawings[:1], example.cameras[0].packed[None])
+    other = sketches.seen_by(example.cameras[1].packed[None])
+    fresh = Sketches(sketches.drawings, other.cameras)
+    assert other.fields is sketches.fields
+    np.testing.assert_array_equal(other.fields, fresh.fields)
+    np.testing.assert_array_equal(other.evidence, fresh.evidence)
+    assert (other.evidence != sketches.evidence).any()
+
+
+def test_a_viewpoint_is_as_plausible_among_others_as_alone() -> None:
+    from sketchcore.outline import outline_iou
+    from sketchcore.viewpoint import guess_viewpoint
+
+    example = next(load_testset(1))
+    model, drawing = sk.load_model(), example.drawings[0]
+
+    def fill(name: str) -> float:
+        camera = sk.VIEWPOINTS[name]
+        [volume] = model.first_predictions([Sketches(drawing[None], camera.packed[None])])
+        return outline_iou(volume, camera, drawing)
+
+    ranked = [fill(name) for name in guess_viewpoint(model, drawing)]
+    assert len(ranked) == len(sk.QUARTER_VIEWS)
+    np.testing.assert_allclose(ranked, sorted(ranked, reverse=True), atol=0.01)
