@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 View = str | Camera
 ModelLike = str | os.PathLike[str] | Model | None
 Progress = Callable[[int, int, Volume], None]
-TOLERANCE = 0.04
-"""Rounds stop when fewer voxels than this share of the solid's change sides: on the test set that costs no accuracy."""
-SOONEST = 2
-"""The first round that may be the last: a network may look at the drawings differently in each of the first ones."""
+TOLERANCE = 0.02
+"""Rounds end when the next is expected to move fewer voxels than this share of the solid's to the other side."""
+FIRST = 3.5
+"""How much more than its second round the shipped network's first one moves; a later one, about as much as the next."""
 
 
 @dataclass(frozen=True)
@@ -171,8 +171,9 @@ def reconstruct(
             single drawing only, guesses among the eight three-quarter views, and the cameras near the best of them
             where its solid fills the outline poorly.
         iterations: rounds over all drawings, 0 or more; fewer are run where the solid has settled.
-        tolerance: what that means: from the second round on, they stop once the voxels that were on the other side
-            of 0.5 a round before are fewer than this share of those that are occupied. At 0 they never stop early.
+        tolerance: what that means: they stop after a round that moved fewer voxels to the other side of 0.5 than
+            this share of those that are occupied; the first round, which moves most, may move 3.5 times as many. At
+            0 they never stop early.
         model: None for the weights inside the package, a path to weights, or a loaded model (`load_model`).
         device: None for CUDA where there is one, else the CPU.
         progress: called as `progress(round, iterations, probability)` after the first prediction (round 0) and
@@ -225,7 +226,7 @@ def _run(
         last, before = before, volume
         if last is not None:
             trace.append(float(np.sqrt(np.mean((volume - last) ** 2))))
-            if number >= SOONEST and crossing(last, volume) < tolerance:
+            if crossing(last, volume) < tolerance * (FIRST if number == 1 else 1):
                 break
     assert before is not None
     return Reconstruction(before, views, tuple(trace), drawings, _model=model)
