@@ -150,8 +150,8 @@ def test_rounds_take_turns_and_average() -> None:
     volumes = list(model.rounds(sketches, 5))
     assert len(volumes) == 6
     cameras = sketches.cameras
-    mirrors = [cameras, mirror_cameras(cameras, 0), mirror_cameras(cameras, 2)]
-    mirrors.append(mirror_cameras(mirrors[1], 2))
+    along_x = mirror_cameras(cameras, 0)
+    mirrors = [cameras, along_x, mirror_cameras(along_x, 2), mirror_cameras(cameras, 2)]
     np.testing.assert_array_equal(looks, mirrors, "each of the four is read once")
     for volume in volumes:
         assert volume.shape == (64, 64, 64)
@@ -181,14 +181,26 @@ def test_a_look_along_x_answers_in_the_world_as_it_is() -> None:
     np.testing.assert_allclose(second, join_pieces(heed_outlines(mean, sketches)), atol=1e-6)
 
 
+def test_both_directions_along_x_weigh_the_same() -> None:
+    model = CompactModel(awake(CompactNet(TINY)), CPU)
+    sketches = chains((1,))[0].sketches
+    said = iter([0.1, 0.2, 0.4, 0.5, 0.3])
+    model.net.decide = lambda *_: torch.full((1, 32, 32, 16, 8), next(said))  # type: ignore[method-assign]
+    means = [0.1, (0.1 + 0.2) / 2, (0.1 + 0.3) / 2, (0.3 + 0.3) / 2, (0.4 + 0.3) / 2]
+    for mean, volume in zip(means, model.rounds(sketches, 4), strict=True):
+        expected = heed_outlines(np.full((64, 64, 64), mean, np.float32), sketches)
+        np.testing.assert_allclose(volume, join_pieces(expected), rtol=1e-5)
+
+
 def test_a_volume_known_before_is_one_prediction_among_others() -> None:
     model = CompactModel(awake(CompactNet(TINY)), CPU)
     sketches = chains((1,))[0].sketches
     start = np.zeros((64, 64, 64), np.float32)
     start[:, :, :32] = 1.0
     model.net.decide = lambda *_: torch.full((1, 32, 32, 16, 8), 0.2)  # type: ignore[method-assign]
-    mean = np.full((64, 64, 64), (0.5 + 0.2) / 2, np.float32)
-    np.testing.assert_allclose(next(model.rounds(sketches, 0, start)), heed_outlines(mean, sketches), rtol=1e-5)
+    for number, volume in enumerate(model.rounds(sketches, 3, start)):
+        mean = np.full((64, 64, 64), (0.5 + (number + 1) * 0.2) / (number + 2), np.float32)
+        np.testing.assert_allclose(volume, join_pieces(heed_outlines(mean, sketches)), rtol=1e-5)
 
 
 @pytest.mark.parametrize("fractional", [False, True])

@@ -34,7 +34,7 @@ def test_every_number_of_views_is_timed(tiny: Path) -> None:
     cost = measure_cost(tiny, repetitions=1)
     assert len(cost.milliseconds) == len(cost.rounds) == 4
     assert all(ms > 0 for ms in cost.milliseconds)
-    assert all(2 <= n <= ROUNDS for n in cost.rounds)
+    assert all(1 <= n <= ROUNDS for n in cost.rounds)
     assert cost.first_call > 1e-3 * cost.milliseconds[0], "it includes such a reconstruction, and more"
     assert cost.peak > 100, "torch alone takes more"
     assert cost.threads >= 1

@@ -108,6 +108,15 @@ def test_drawings_seen_by_other_cameras_are_the_same_drawings() -> None:
     assert (other.evidence != sketches.evidence).any()
 
 
+def test_mirrored_drawings_have_mirrored_fields() -> None:
+    for example in load_testset(5):
+        sketches = Sketches(example.drawings, np.stack([camera.packed for camera in example.cameras]))
+        mirrored = sketches.mirrored(0)
+        fresh = Sketches(mirrored.drawings, mirrored.cameras)
+        np.testing.assert_array_equal(mirrored.fields, fresh.fields)
+        np.testing.assert_array_equal(mirrored.mirrored(0).fields, sketches.fields)
+
+
 def test_a_viewpoint_is_as_plausible_among_others_as_alone() -> None:
     from sketchcore.outline import outline_iou
     from sketchcore.viewpoint import guess_viewpoint

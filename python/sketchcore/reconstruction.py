@@ -167,8 +167,9 @@ def reconstruct(
             single drawing only, guesses among the eight three-quarter views, and the cameras near the best of them
             where its solid fills the outline poorly.
         iterations: rounds over all drawings, 0 or more; fewer are run where the solid has settled.
-        tolerance: what that means: from the second round on, they stop once the voxels that were on the other side
-            of 0.5 a round before are fewer than this share of those that are occupied. At 0 they never stop early.
+        tolerance: what that means: they stop after a round that moved fewer voxels to the other side of 0.5 than
+            this share of those that are occupied; the first round, which moves most, may move 3.5 times as many. At
+            0 they never stop early.
         model: None for the weights inside the package, a path to weights, or a loaded model (`load_model`).
         device: None for CUDA where there is one, else the CPU.
         progress: called as `progress(round, iterations, probability)` after the first prediction (round 0) and

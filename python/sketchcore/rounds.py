@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from sketchcore import _core
 
 Volume = NDArray[np.float32]
-TOLERANCE = 0.04
-"""Rounds stop when fewer voxels than this share of the solid's change sides: on the test set that costs no accuracy."""
-SOONEST = 2
-"""The first round that may be the last: a network may look at the drawings differently in each of the first ones."""
+TOLERANCE = 0.02
+"""Rounds end when the next is expected to move fewer voxels than this share of the solid's to the other side."""
+FIRST = 3.5
+"""How much more than its second round the shipped network's first one moves; a later one, about as much as the next."""
 
 Predict = Callable[[int, Volume | None], Volume]
 
@@ -54,16 +54,16 @@ def visit(predict: Predict, cameras: NDArray[np.float64], view: int, volume: Vol
 
 
 def until_settled(volumes: Iterator[Volume], tolerance: float = TOLERANCE) -> Iterator[Volume]:
-    """The volumes of rounds up to the first one that changes next to nothing, not before the second round.
+    """The volumes of rounds up to the one after which the next would change next to nothing.
 
     Args:
         volumes: the first prediction, then each round's.
-        tolerance: rounds end with the first that has less `crossing` than this; 0 for all of them.
+        tolerance: the least share of the occupied voxels (`crossing`) that a round is worth running for; 0 for all.
     """
     before: Volume | None = None
     for number, volume in enumerate(volumes):
         yield volume
-        if before is not None and number >= SOONEST and crossing(before, volume) < tolerance:
+        if before is not None and crossing(before, volume) < tolerance * (FIRST if number == 1 else 1):
             return
         before = volume
 

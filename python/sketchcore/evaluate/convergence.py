@@ -49,7 +49,7 @@ class Convergence:
 def measure_convergence(
     model: Model, shapes: int | None = 100, progress: Callable[[int, int], None] | None = None
 ) -> Convergence:
-    """Ten rounds, none saved, over one to four drawings of the fixed test set, and several orders of them (paper, section 6.4).
+    """Ten rounds, none saved, over one to four drawings of the test set, and orders of them (paper, section 6.4).
 
     Args:
         model: the network.

@@ -39,13 +39,12 @@ class CompactInference:
         self.dtype = fast_dtype(device)
         cast = {id(p): nn.Parameter(p.detach().to(device, self.dtype), False) for p in net.parameters()}
         self._net = place(deepcopy(net, cast), device).eval()
-        # Reading and what is kept are 1 % of the work: float32.
         self._reading = [p.detach().to(device, torch.float32) for p in (net.reading.weight, net.reading.bias)]
         layers = (net.decoder.into, net.decoder.shortcut)
         weight = torch.cat([layer.weight.detach().flatten(1) for layer in layers]).to(device, torch.float32).t()
         bias = torch.cat([layer.bias.detach() for layer in layers if layer.bias is not None])
-        self._seen, prior, where = torch.split(weight, [len(weight) - 8 - 3, 8, 3])
-        self._prior = prior.to(self.dtype)
+        seen, self._evidence, prior, where = torch.split(weight, [2 * net.config.fused, 8 * EVIDENCE, 8, 3])
+        self._seen, self._prior = seen.to(self.dtype), prior.to(self.dtype)
         places = net.decoder.place.detach().to(device, torch.float32).flatten(0, 2)
         self._where = torch.addmm(bias.to(device, torch.float32), places, where)
 
@@ -73,12 +72,14 @@ class CompactInference:
         each = torch.empty(len(cameras), math.prod(COARSE), len(self._reading[1]), device=self.device)
         for first in range(0, len(cameras), PAIR):
             some = slice(first, first + PAIR)
-            features = self._net.encoder(drawings[some], fields[some], rotations[some])
-            each[some] = F.linear(lift(features, cameras[some]), *self._reading).relu_()
-        seen = torch.stack([torch.cat([e.mean(dim=0), e.amax(dim=0)], dim=-1) for e in torch.split(each, counts)])
-        known = torch.cat([seen, evidence.view(len(samples), -1, 8 * EVIDENCE)], dim=-1)
-        out: Tensor = (known @ self._seen + self._where).to(self.dtype)
-        return out
+            lifted = lift(self._net.encoder(drawings[some], fields[some], rotations[some]), cameras[some])
+            each[some] = F.linear(lifted, *self._reading).relu_()
+        out = []
+        for own, known in zip(torch.split(each, counts), evidence.flatten(1, 3), strict=True):
+            seen = torch.cat([own.mean(dim=0), own.amax(dim=0)], dim=-1).to(self.dtype)
+            kept = torch.addmm(self._where, known, self._evidence).to(self.dtype)
+            out.append(torch.addmm(kept, seen, self._seen))
+        return torch.stack(out)
 
     @torch.inference_mode()
     def decide(self, readings: Tensor, prior: Tensor | None, counts: Sequence[int]) -> Tensor:

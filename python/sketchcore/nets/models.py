@@ -49,7 +49,7 @@ class Model(Protocol):
         ...
 
 
-LOOKS: tuple[tuple[int, ...], ...] = ((), (0,), (2,), (0, 2))
+LOOKS: tuple[tuple[int, ...], ...] = ((), (0,), (0, 2), (2,))
 """Axes that the world is mirrored along in each of four rounds, over and over: what differs most comes first."""
 BATCH = 8
 """Objects that first predictions are made of side by side."""
@@ -60,8 +60,9 @@ class CompactModel:
 
     Mirrored, a world is seen by mirrored cameras in drawings flipped left to right. That describes the same object
     as well: about z = 0 because it is symmetric, along x because a mirrored object is an object too. The network
-    answers each of the four descriptions a little differently; the volume is the mean of its latest answers, and
-    each next round's prior. What is handed out has every outline filled (`outlines.py`), and its pieces joined
+    answers each of the four descriptions a little differently, above all those that are mirrored along x from those
+    that are not; the volume is the mean of its latest answers, in which both kinds weigh the same, and each next
+    round's prior. What is handed out has every outline filled (`outlines.py`), and its pieces joined
     (`pieces.py`).
     """
 
@@ -77,12 +78,12 @@ class CompactModel:
                 yield whole(cells[None])
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
-        answers: dict[tuple[int, ...] | None, Tensor] = {}
-        mean: Tensor | None = None
+        answers: dict[tuple[int, ...], Tensor] = {}
+        known: Tensor | None = None
         if start is not None:
             half = 0.5 * (start + start[:, :, ::-1])[:, :, 32:]
-            mean = fold(torch.from_numpy(np.ascontiguousarray(half, np.float32)).to(self.device)[None, None])
-            answers[None] = mean
+            known = fold(torch.from_numpy(np.ascontiguousarray(half, np.float32)).to(self.device)[None, None])
+        mean = known
         evidence = self.net.evidence([sketches])
         readings: dict[tuple[int, ...], Tensor] = {}
         for number in range(iterations + 1):
@@ -92,8 +93,16 @@ class CompactModel:
                 readings[look] = self.net.read([reduce(Sketches.mirrored, look, sketches)], turn(evidence))
             prior = None if mean is None else turn(mean)
             answers[look] = turn(self.net.decide(readings[look], prior, [len(sketches)]))
-            mean = torch.stack([*answers.values()]).mean(dim=0)
+            mean = _balanced(answers)
+            if known is not None:  # one prediction among those of the drawings
+                mean = (known + len(answers) * mean) / (1 + len(answers))
             yield join_pieces(heed_outlines(whole(mean), sketches))
+
+
+def _balanced(answers: dict[tuple[int, ...], Tensor]) -> Tensor:
+    """The mean of answers, in which those mirrored along x weigh as much as the others."""
+    kinds = [[answer for look, answer in answers.items() if (0 in look) == mirrored] for mirrored in (False, True)]
+    return torch.stack([torch.stack(kind).mean(dim=0) for kind in kinds if kind]).mean(dim=0)
 
 
 def _as_it_is(cells: Tensor) -> Tensor:

@@ -39,22 +39,26 @@ def heed_outlines(volume: Volume, sketches: Sketches) -> Volume:
         float32 [64, 64, 64], symmetric as well. No logit moves by more than `LIMIT`.
     """
     least = np.float32(1 / (1 + np.exp(FAR)))
-    known = np.clip(volume, least, 1 - least)
+    known = np.clip(volume[:, :, 32:], least, 1 - least)
     logits = np.log(known / (1 - known))
-    missing = np.zeros_like(logits)
+    # Zero is what lies outside the grid: there is nothing.
+    above = _whole(logits + np.float32(FAR))[None]
+    missing = np.zeros_like(volume)
     for pixels, camera in zip(sketches.depths, sketches.cameras, strict=True):
-        # Zero is what lies outside the grid: there is nothing.
-        along = _core.to_camera_grid(logits[None] + np.float32(FAR), camera[None])[0].max(axis=0) - np.float32(FAR)
+        along = _core.to_camera_grid(above, camera[None])[0].max(axis=0) - np.float32(FAR)
         asked = np.minimum(SLOPE * (pixels - STROKE), MARGIN)
         lack = gaussian_filter(np.clip(asked - along, 0, LIMIT) * (pixels > 0), BLUR)
-        each = np.zeros_like(logits)
+        each = np.zeros_like(volume)
         spread = np.ascontiguousarray(np.broadcast_to(lack, (1, 64, 64, 64)))
         _core.to_world_grid(spread, camera[None], each[None])
         missing = np.maximum(missing, each)
-    missing = np.maximum(missing, missing[:, :, ::-1])
+    missing = np.maximum(missing[:, :, 32:], missing[:, :, 31::-1])
     hull = sketches.evidence[0]
-    hull = np.concatenate([hull[:, :, ::-1], hull], axis=2)
     raised = logits + np.where(hull >= BORDER - PIXEL, missing, 0)
     cut = np.where(hull < BORDER - 2 * PIXEL, np.clip(logits + MARGIN, 0, LIMIT), 0)
-    moved: Volume = (1 / (1 + np.exp(cut - raised))).astype(np.float32)
-    return moved
+    return _whole((1 / (1 + np.exp(cut - raised))).astype(np.float32))
+
+
+def _whole(half: Volume) -> Volume:
+    """A volume that is symmetric about z = 0, from its half z > 0."""
+    return np.concatenate([half[:, :, ::-1], half], axis=2)

@@ -49,14 +49,20 @@ class Sketches:
         return _core.evidence(self.fields, self.cameras)
 
     def seen_by(self, cameras: NDArray[np.float64]) -> Sketches:
-        """The same drawings, made by other cameras, float64 [n, 15]: what is known of them alone is kept."""
-        other = Sketches(self.drawings, cameras)
-        other.__dict__["fields"] = self.fields  # what `cached_property` looks up
-        return other
+        """The same drawings, made by other cameras, float64 [n, 15]."""
+        return _known(self.drawings, cameras, self.fields)
 
     def mirrored(self, axis: int) -> Sketches:
         """The object mirrored along a world axis (0 or 2 for x or z), as mirrored cameras see it."""
-        return Sketches(np.ascontiguousarray(self.drawings[:, :, ::-1]), mirror_cameras(self.cameras, axis))
+        drawings, fields = (np.ascontiguousarray(images[:, :, ::-1]) for images in (self.drawings, self.fields))
+        return _known(drawings, mirror_cameras(self.cameras, axis), fields)
+
+
+def _known(drawings: NDArray[np.uint8], cameras: NDArray[np.float64], fields: NDArray[np.uint8]) -> Sketches:
+    """Drawings whose fields are known already."""
+    sketches = Sketches(drawings, cameras)
+    sketches.__dict__["fields"] = fields  # where `cached_property` looks
+    return sketches
 
 
 def mirror_cameras(cameras: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
