@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 import sketchcore as sk
 from sketchcore.evaluate.accuracy import measure_accuracy
 from sketchcore.evaluate.comparison import compare
 from sketchcore.evaluate.convergence import measure_convergence
 from sketchcore.evaluate.drawings import measure_drawings
+from sketchcore.evaluate.failures import measure_failures
 from sketchcore.evaluate.figure import Figure
 from sketchcore.evaluate.parts import PARTS, measure_part, write_part
 from sketchcore.evaluate.present import comparison_table
@@ -120,6 +122,18 @@ def test_carving_suffers_from_faulty_drawings() -> None:
     assert report.drop["shift"][2][1].mean > max(0.1, report.drop["shift"][0][1].mean)
     assert report.drop["all together"][2][1].mean > 0.1
     assert PARTS["robustness"].table(report).row_count == 10
+
+
+def test_the_worst_shapes_come_first_and_are_drawn(tmp_path: Path) -> None:
+    report = measure_failures(Carver(), 8, tmp_path)
+    scores = [failure.iou for failure in report.worst]
+    assert scores == sorted(scores)
+    assert len(scores) == 6
+    hulls = [sk.iou(sk.carve(e.drawings[:1], e.cameras[:1]), e.world) for e in load_testset(8)]
+    assert scores == sorted(hulls)[:6]
+    with Image.open(tmp_path / "failures.png") as image:
+        assert image.size == (5 * 256, 6 * 256)
+    assert PARTS["failures"].table(report).row_count == 6
 
 
 def test_peoples_drawings_are_measured_by_their_outlines(tmp_path: Path) -> None:

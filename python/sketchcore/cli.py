@@ -148,11 +148,11 @@ def train(
 @app.command()
 def evaluate(
     part: Annotated[
-        str, typer.Argument(help="What to measure: accuracy, convergence, robustness, cost, or drawings.")
+        str, typer.Argument(help="What to measure: accuracy, convergence, robustness, cost, drawings, failures.")
     ] = "accuracy",
     model: Model = None,
     shapes: Annotated[
-        int | None, typer.Option(help="The first so many shapes (accuracy 500, convergence 100, robustness 50).")
+        int | None, typer.Option(help="The first so many shapes (all 500; convergence 100, robustness 50).")
     ] = None,
     drawings: Annotated[
         list[Path] | None, typer.Option("--drawings", help="Folders of people's drawings, for the part drawings.")
@@ -166,7 +166,7 @@ def evaluate(
 
     accuracy: IoU by views and rounds, concavities, carving, ceiling, viewpoint. convergence: ten rounds, and orders of
     the drawings. robustness: faulty drawings. cost: time and memory. drawings: outlines of people's drawings, pieces,
-    and pictures from four sides.
+    and pictures from four sides. failures: the shapes that come out worst, with a picture.
     """
     with _errors():
         from sketchcore.evaluate.parts import PARTS, measure_part, write_part

@@ -51,9 +51,8 @@ def guess_camera(model: Model, drawing: NDArray[np.uint8]) -> tuple[str, Camera]
     fill, name = _ranked(model, drawing)[0]
     if fill >= _POOR:
         return name, VIEWPOINTS[name]
-    half_turn = (QUARTER_VIEWS.index(name) + len(QUARTER_VIEWS) // 2) % len(QUARTER_VIEWS)
     tried = []
-    for near in (name, QUARTER_VIEWS[half_turn]):
+    for near in (name, opposite(name)):
         position = VIEWPOINTS[near].position
         azimuth = math.degrees(math.atan2(position[2], position[0]))
         for turn, elevation, fov in itertools.product(_TURNS, _ELEVATIONS, _FIELDS_OF_VIEW):
@@ -61,6 +60,11 @@ def guess_camera(model: Model, drawing: NDArray[np.uint8]) -> tuple[str, Camera]
     fills = _plausibilities(model, drawing, [camera for _, camera in tried])
     best, (near, camera) = max(zip(fills, tried, strict=True), key=lambda one: one[0])
     return (near, camera) if best > fill + _GAIN else (name, VIEWPOINTS[name])
+
+
+def opposite(name: str) -> str:
+    """The three-quarter viewpoint half a turn about y from another one."""
+    return QUARTER_VIEWS[(QUARTER_VIEWS.index(name) + len(QUARTER_VIEWS) // 2) % len(QUARTER_VIEWS)]
 
 
 def _ranked(model: Model, drawing: NDArray[np.uint8]) -> list[tuple[float, str]]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sketchcore.camera import Camera, pack_cameras
 from sketchcore.evaluate.figure import Figure
-from sketchcore.evaluate.testset import Example, load_testset
+from sketchcore.evaluate.testset import Example, count_shapes, load_testset
 from sketchcore.grids import carve, to_world_grid
 from sketchcore.nets.models import Model
 from sketchcore.nets.sketches import Sketches
@@ -71,12 +71,12 @@ def measure_accuracy(
     Raises:
         ValueError: for a number of shapes outside 1 ... 500.
     """
-    examples = list(load_testset(shapes))
-    network = np.empty((len(examples), VIEWS, ROUNDS + 1))
-    concavities, carving, orthogonal = np.empty((3, len(examples), VIEWS))
-    ceiling, viewpoint = np.empty((2, len(examples)))
+    total = count_shapes(shapes)
+    network = np.empty((total, VIEWS, ROUNDS + 1))
+    concavities, carving, orthogonal = np.empty((3, total, VIEWS))
+    ceiling, viewpoint = np.empty((2, total))
     seconds = 0.0
-    for i, example in enumerate(examples):
+    for i, example in enumerate(load_testset(shapes)):
         hulls = [carve(example.drawings[:n], list(example.cameras[:n])) for n in range(1, VIEWS + 1)]
         started = time.perf_counter()
         for v in range(VIEWS):
@@ -89,10 +89,10 @@ def measure_accuracy(
         ceiling[i] = iou(to_world_grid(example.frustum(0), example.cameras[0]), example.world)
         viewpoint[i] = _same_up_to_half_turn(guess_viewpoint(model, example.drawings[0])[0], example.viewpoint)
         if progress is not None:
-            progress(i + 1, len(examples))
+            progress(i + 1, total)
     last = network[:, :, -1]
     return Accuracy(
-        shapes=len(examples),
+        shapes=total,
         network=[[Figure.of(network[:, v, r]) for r in range(ROUNDS + 1)] for v in range(VIEWS)],
         gain=[Figure.of(last[:, v + 1] - last[:, v]) for v in range(VIEWS - 1)],
         concavities=[Figure.of(concavities[:, v]) for v in range(VIEWS)],
@@ -100,7 +100,7 @@ def measure_accuracy(
         orthogonal=[Figure.of(orthogonal[:, v]) for v in range(VIEWS)],
         ceiling=Figure.of(ceiling),
         viewpoint=Figure.of(viewpoint),
-        seconds=seconds / len(examples),
+        seconds=seconds / total,
         each=last.tolist(),
     )
 

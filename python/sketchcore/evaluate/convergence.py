@@ -12,7 +12,7 @@ import numpy as np
 from sketchcore.camera import pack_cameras
 from sketchcore.evaluate.accuracy import ROUNDS, VIEWS, predictions
 from sketchcore.evaluate.figure import Figure
-from sketchcore.evaluate.testset import Example, load_testset
+from sketchcore.evaluate.testset import Example, count_shapes, load_testset
 from sketchcore.nets.models import Model
 from sketchcore.nets.sketches import Sketches
 from sketchcore.volume import iou
@@ -59,11 +59,11 @@ def measure_convergence(
     Raises:
         ValueError: for a number of shapes outside 1 ... 500.
     """
-    examples = list(load_testset(shapes))
-    network = np.empty((len(examples), VIEWS, MANY_ROUNDS + 1))
-    change = np.empty((len(examples), VIEWS, MANY_ROUNDS))
-    orders = np.empty((len(examples), VIEWS - 1))
-    for i, example in enumerate(examples):
+    total = count_shapes(shapes)
+    network = np.empty((total, VIEWS, MANY_ROUNDS + 1))
+    change = np.empty((total, VIEWS, MANY_ROUNDS))
+    orders = np.empty((total, VIEWS - 1))
+    for i, example in enumerate(load_testset(shapes)):
         for v in range(VIEWS):
             volumes = predictions(model, example, v + 1, MANY_ROUNDS, tolerance=0)
             network[i, v] = [iou(volume, example.world) for volume in volumes]
@@ -71,10 +71,10 @@ def measure_convergence(
             if v > 0:
                 orders[i, v - 1] = _spread(model, example, v + 1)
         if progress is not None:
-            progress(i + 1, len(examples))
+            progress(i + 1, total)
     means = network.mean(axis=0)
     return Convergence(
-        shapes=len(examples),
+        shapes=total,
         change=[[Figure.of(change[:, v, r]) for r in range(MANY_ROUNDS)] for v in range(VIEWS)],
         network=[[Figure.of(network[:, v, r]) for r in range(MANY_ROUNDS + 1)] for v in range(VIEWS)],
         refined=Figure.of(network[:, 0, -1] - network[:, 0, 0]),

@@ -15,6 +15,7 @@ from rich.table import Table
 
 VIEWS = 4
 ROUNDS = 5
+SHAPES = 5
 PAPER = {"paper, TitanX": (140.0, 210.0, 280.0, 350.0), "paper, laptop CPU": (1000.0, 1500.0, 2200.0, 2900.0)}
 """Milliseconds for one to four views and five rounds, as the paper reports them."""
 
@@ -25,7 +26,7 @@ class Cost:
 
     Attributes:
         milliseconds: a reconstruction from one to four drawings with their views, at most five rounds: median.
-        rounds: how many of the five were run, before the solid had settled.
+        rounds: how many of the five were run, before the solid had settled: mean.
         first_call: seconds from `import sketchcore` to the first solid, from one drawing, in a fresh process.
         peak: megabytes (10^6 bytes) of memory that a process held at most, which did that and then all
             reconstructions timed here: torch and the interpreter included.
@@ -33,7 +34,7 @@ class Cost:
     """
 
     milliseconds: tuple[float, ...]
-    rounds: tuple[int, ...]
+    rounds: tuple[float, ...]
     first_call: float
     peak: float
     threads: int
@@ -43,15 +44,15 @@ class Cost:
         return asdict(self)
 
 
-def measure_cost(model: str | os.PathLike[str] | None = None, repetitions: int = 15) -> Cost:
-    """Measures the shipped settings in a fresh process, on the test set's first shape.
+def measure_cost(model: str | os.PathLike[str] | None = None, repetitions: int = 5) -> Cost:
+    """Measures the shipped settings in a fresh process, on the test set's first five shapes.
 
     Numbers of views take turns, so that what disturbs the machine disturbs all of them alike. Drawings are at hand as
     arrays; the first reconstruction from each number of them is not timed.
 
     Args:
         model: weights; None for those inside the package.
-        repetitions: how often each number of views is timed, at least 1.
+        repetitions: how often each number of views is timed on each shape, at least 1.
 
     Raises:
         ValueError: for a number of repetitions below 1.
@@ -64,13 +65,12 @@ def measure_cost(model: str | os.PathLike[str] | None = None, repetitions: int =
         raise FileNotFoundError(f"no weights at {os.fspath(model)}")
     from sketchcore.evaluate.testset import load_testset
 
-    example = next(load_testset(1))
-    task = {
-        "model": None if model is None else str(Path(model).resolve()),
-        "repetitions": repetitions,
-        "drawings": example.drawings.tolist(),
-        "cameras": [camera.packed.tolist() for camera in example.cameras[:VIEWS]],
-    }
+    objects = [
+        {"shape": example.shape.to_json(), "cameras": [camera.packed.tolist() for camera in example.cameras[:VIEWS]]}
+        for example in load_testset(SHAPES)
+    ]
+    weights = None if model is None else str(Path(model).resolve())
+    task = {"model": weights, "repetitions": repetitions, "objects": objects}
     # The same package as this one, wherever it lies; and no other script beside it.
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     command = [sys.executable, "-P", str(Path(__file__).with_name("cost_process.py"))]
@@ -95,7 +95,7 @@ def cost_as_table(cost: Cost) -> Table:
         table.add_column(f"{n} view{'s' if n > 1 else ''}", justify="right")
     cores = f"{cost.threads} thread{'s' if cost.threads > 1 else ''}"
     table.add_row(f"sketchcore, CPU, {cores}", *(f"{ms:.0f} ms" for ms in cost.milliseconds))
-    table.add_row("rounds until it settled", *map(str, cost.rounds))
+    table.add_row("rounds until it settled", *(f"{rounds:.1f}" for rounds in cost.rounds))
     for name, times in PAPER.items():
         table.add_row(name, *(f"{ms:.0f} ms" for ms in times))
     table.caption = (

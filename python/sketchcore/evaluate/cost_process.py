@@ -15,26 +15,33 @@ def main() -> None:
 
     import sketchcore as sk
 
-    drawings = [np.array(drawing, np.uint8) for drawing in task["drawings"]]
-    cameras = [sk.Camera.from_packed(np.array(row)) for row in task["cameras"]]
+    objects = []
+    for entry in task["objects"]:
+        cameras = [sk.Camera.from_packed(np.array(row)) for row in entry["cameras"]]
+        shape = sk.Shape.from_json(entry["shape"])
+        objects.append(([sk.draw(shape, camera) for camera in cameras], cameras))
     model = sk.load_model(task["model"])
+    drawings, cameras = objects[0]
     sk.reconstruct(drawings[:1], cameras[:1], model=model)
     first_call = time.perf_counter() - started
 
     counts = range(1, len(drawings) + 1)
     seconds: list[list[float]] = [[] for _ in counts]
-    rounds = [len(sk.reconstruct(drawings[:n], cameras[:n], model=model).trace) for n in counts]
-    for _ in range(task["repetitions"]):
-        for n in counts:
-            begun = time.perf_counter()
-            sk.reconstruct(drawings[:n], cameras[:n], model=model)
-            seconds[n - 1].append(time.perf_counter() - begun)
+    rounds: list[list[int]] = [[] for _ in counts]
+    for repetition in range(1 + task["repetitions"]):
+        for drawings, cameras in objects:
+            for n in counts:
+                begun = time.perf_counter()
+                solid = sk.reconstruct(drawings[:n], cameras[:n], model=model)
+                if repetition:  # the first time is for warming up
+                    seconds[n - 1].append(time.perf_counter() - begun)
+                    rounds[n - 1].append(len(solid.trace))
     import torch
 
     figures = {
         "first_call": first_call,
         "seconds": seconds,
-        "rounds": rounds,
+        "rounds": [sum(each) / len(each) for each in rounds],
         "peak": peak_memory(),
         "threads": torch.get_num_threads(),
     }

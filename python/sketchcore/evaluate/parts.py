@@ -18,6 +18,7 @@ from sketchcore.evaluate.accuracy import measure_accuracy
 from sketchcore.evaluate.convergence import measure_convergence
 from sketchcore.evaluate.cost import cost_as_table, measure_cost
 from sketchcore.evaluate.drawings import measure_drawings
+from sketchcore.evaluate.failures import measure_failures
 from sketchcore.evaluate.plots import plot_accuracy, plot_convergence, plot_robustness
 from sketchcore.evaluate.robustness import measure_robustness
 from sketchcore.reconstruction import load_model
@@ -47,6 +48,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
         "robustness": Part(measure_robustness, present.robustness_table, plot_robustness),
         "cost": Part(measure_cost, cost_as_table, by_shapes=False),
         "drawings": Part(measure_drawings, present.drawings_table, by_shapes=False),
+        "failures": Part(measure_failures, present.failures_table),
     }
 )
 
@@ -66,7 +68,7 @@ def measure_part(
         weights: path to weights; None for those in the package.
         shapes: the first so many of the test set; None for as many as the part takes by itself.
         folders: of drawings, for the part "drawings" alone.
-        out: folder for the pictures of the part "drawings"; made where it is missing.
+        out: folder for the pictures of the parts "drawings" and "failures"; made where it is missing.
         progress: called as `progress(done, total)`.
 
     Raises:
@@ -79,8 +81,9 @@ def measure_part(
     if part.by_shapes:
         if folders:
             raise ValueError(f"{name} is measured on the fixed test set; --drawings goes with the part drawings")
-        count = {} if shapes is None else {"shapes": shapes}
-        return part.measure(load_model(weights), progress=progress, **count)
+        given = {} if shapes is None else {"shapes": shapes}
+        pictures = {"out": out} if name == "failures" else {}
+        return part.measure(load_model(weights), progress=progress, **given, **pictures)
     if name == "cost":
         if folders or shapes is not None:
             raise ValueError("cost takes no --drawings and no --shapes")

@@ -9,6 +9,7 @@ from sketchcore.evaluate.comparison import Comparison
 from sketchcore.evaluate.convergence import MANY_ROUNDS, Convergence
 from sketchcore.evaluate.distort import STRENGTHS
 from sketchcore.evaluate.drawings import Drawings
+from sketchcore.evaluate.failures import Failures
 from sketchcore.evaluate.robustness import COUNTS, Robustness
 
 
@@ -75,6 +76,14 @@ def drawings_table(report: Drawings) -> Table:
     for drawn in report.objects:
         overlaps = " ".join(f"{overlap:.2f}" for overlap in drawn.outline)
         table.add_row(drawn.name, overlaps, str(drawn.pieces), " ".join(drawn.views) + " (guessed)" * drawn.guessed)
+    return table
+
+
+def failures_table(report: Failures) -> Table:
+    """The shapes with the lowest IoU."""
+    table = _table(f"Worst of the first {report.shapes} shapes of the fixed test set, one drawing", "IoU")
+    for failure in report.worst:
+        table.add_row(f"shape {failure.shape}", f"{failure.iou:.3f}")
     return table
 
 

@@ -12,7 +12,7 @@ from sketchcore.camera import pack_cameras
 from sketchcore.evaluate.accuracy import ROUNDS, VIEWS
 from sketchcore.evaluate.distort import STRENGTHS, distorted
 from sketchcore.evaluate.figure import Figure
-from sketchcore.evaluate.testset import Example, load_testset
+from sketchcore.evaluate.testset import Example, count_shapes, load_testset
 from sketchcore.nets.models import Model
 from sketchcore.nets.sketches import Sketches
 from sketchcore.rounds import until_settled
@@ -55,21 +55,21 @@ def measure_robustness(
     Raises:
         ValueError: for a number of shapes outside 1 ... 500.
     """
-    examples = list(load_testset(shapes))
-    clean = np.empty((len(examples), len(COUNTS)))
+    total = count_shapes(shapes)
+    clean = np.empty((total, len(COUNTS)))
     kinds: dict[str, tuple[str, ...]] = {name: (name,) for name in STRENGTHS} | {TOGETHER: tuple(STRENGTHS)}
-    spoilt = {kind: np.empty((len(examples), 3, len(COUNTS))) for kind in kinds}
-    for i, example in enumerate(examples):
+    spoilt = {kind: np.empty((total, 3, len(COUNTS))) for kind in kinds}
+    for i, example in enumerate(load_testset(shapes)):
         clean[i] = _scores(model, example, {}, i)
         for kind, names in kinds.items():
             for strength in (1, 2, 3):
                 faults = dict.fromkeys(names, strength)
                 spoilt[kind][i, strength - 1] = _scores(model, example, faults, i)
         if progress is not None:
-            progress(i + 1, len(examples))
+            progress(i + 1, total)
     counts = range(len(COUNTS))
     return Robustness(
-        shapes=len(examples),
+        shapes=total,
         clean=[Figure.of(clean[:, c]) for c in counts],
         drop={
             kind: [[Figure.of(clean[:, c] - values[:, s, c]) for c in counts] for s in range(3)]

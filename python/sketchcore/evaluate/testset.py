@@ -15,6 +15,8 @@ from sketchcore.camera import VIEWPOINTS, Camera
 from sketchcore.grids import draw, frustum, voxelize
 from sketchcore.shape import Shape
 
+TOTAL = 500
+"""Shapes in the test set."""
 ORTHOGONAL = ("front", "top", "right", "back")
 """Viewpoints of the second kind of carving, in the paper's order (section 6.5)."""
 
@@ -54,18 +56,27 @@ class Example:
         return frustum(self.shape, self.cameras[view]).astype(np.float32) / np.float32(255)
 
 
+def count_shapes(shapes: int | None) -> int:
+    """How many shapes those are: all for None.
+
+    Raises:
+        ValueError: for a number outside 1 ... 500.
+    """
+    if shapes is not None and not 1 <= shapes <= TOTAL:
+        raise ValueError(f"shapes must lie between 1 and {TOTAL}, got {shapes}")
+    return TOTAL if shapes is None else shapes
+
+
 def load_testset(shapes: int | None = None) -> Iterator[Example]:
     """The first `shapes` examples; all 500 for None.
 
     Raises:
         ValueError: for a number outside 1 ... 500.
     """
+    count = count_shapes(shapes)
     data = json.loads((files("sketchcore.evaluate") / "abstract-500.json").read_text())
-    total = len(data["shapes"])
-    if shapes is not None and not 1 <= shapes <= total:
-        raise ValueError(f"shapes must lie between 1 and {total}, got {shapes}")
     lens = (float(data["fov_degrees"]), float(data["near"]), float(data["far"]))
     names = list(VIEWPOINTS)
-    for entry in data["shapes"][:shapes]:
+    for entry in data["shapes"][:count]:
         cameras = tuple(Camera(c["position"], c["rotation"], *lens) for c in entry["cameras"])
         yield Example(Shape.from_json(entry), cameras, names[entry["cameras"][0]["viewpoint"]])
