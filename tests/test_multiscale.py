@@ -158,7 +158,7 @@ def test_stored_weights_build_the_same_model(tmp_path: Path) -> None:
     assert isinstance(model, SingleViewModel)
     np.testing.assert_array_equal(model.predict(drawing), SingleViewModel(net, CPU).predict(drawing))
     solid = sk.reconstruct(drawing[0], "quarter-037", iterations=2, model=path)
-    assert solid.trace == (0.0, 0.0)
+    assert solid.trace == (0.0,), "a round that changes nothing is the last"
 
 
 def test_wrong_arguments_are_named() -> None:
