@@ -14,13 +14,12 @@ from PIL import Image, ImageDraw
 from skimage.measure import approximate_polygon
 from skimage.morphology import skeletonize
 
+from sketchcore.drawing import INK
 from sketchcore.grids import IMAGE
 
 Polyline = NDArray[np.float64]
 """float64 [n, 2], n >= 2: (x, y) in pixels, x to the right, y down; a pixel's centre is at its indices."""
 
-INK = 64
-"""From here on a pixel is part of a line."""
 _CORNER = 40.0
 """Degrees that a line turns by at a corner, which ends one stroke and begins another."""
 _STRAIGHT = 1.5

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sketchcore.camera import Camera, pack_cameras
 from sketchcore.evaluate.figure import Figure
+from sketchcore.evaluate.report import Report
 from sketchcore.evaluate.testset import Example, count_shapes, load_testset
 from sketchcore.grids import carve, to_world_grid
 from sketchcore.nets.models import Model
 from sketchcore.nets.sketches import Sketches
 from sketchcore.rounds import TOLERANCE, until_settled
-from sketchcore.viewpoint import guess_viewpoint
+from sketchcore.viewpoint import guess_viewpoint, opposite
 from sketchcore.volume import iou
 
 VIEWS = 4
@@ -25,7 +25,7 @@ ROUNDS = 5
 
 
 @dataclass(frozen=True)
-class Accuracy:
+class Accuracy(Report):
     """What `measure_accuracy` found; lists over views count from one view.
 
     Attributes:
@@ -53,10 +53,6 @@ class Accuracy:
     seconds: float
     each: list[list[float]]
 
-    def to_dict(self) -> dict[str, Any]:
-        """The report as plain data."""
-        return asdict(self)
-
 
 def measure_accuracy(
     model: Model, shapes: int | None = None, progress: Callable[[int, int], None] | None = None
@@ -76,8 +72,8 @@ def measure_accuracy(
     concavities, carving, orthogonal = np.empty((3, total, VIEWS))
     ceiling, viewpoint = np.empty((2, total))
     seconds = 0.0
-    for i, example in enumerate(load_testset(shapes)):
-        hulls = [carve(example.drawings[:n], list(example.cameras[:n])) for n in range(1, VIEWS + 1)]
+    for i, example in enumerate(load_testset(shapes, progress)):
+        hulls = _hulls(example.drawings, list(example.cameras))
         started = time.perf_counter()
         for v in range(VIEWS):
             volumes = predictions(model, example, v + 1, ROUNDS)
@@ -85,11 +81,10 @@ def measure_accuracy(
             concavities[i, v] = _left_empty(volumes[-1], hulls[v], example.world)
         seconds += time.perf_counter() - started
         carving[i] = [iou(hull, example.world) for hull in hulls]
-        orthogonal[i] = _carving(*example.orthogonal, example)
+        orthogonal[i] = [iou(hull, example.world) for hull in _hulls(*example.orthogonal)]
         ceiling[i] = iou(to_world_grid(example.frustum(0), example.cameras[0]), example.world)
-        viewpoint[i] = _same_up_to_half_turn(guess_viewpoint(model, example.drawings[0])[0], example.viewpoint)
-        if progress is not None:
-            progress(i + 1, total)
+        guess = guess_viewpoint(model, example.drawings[0])[0]
+        viewpoint[i] = guess in (example.viewpoint, opposite(example.viewpoint))
     last = network[:, :, -1]
     return Accuracy(
         shapes=total,
@@ -122,14 +117,6 @@ def _left_empty(volume: NDArray[np.float32], hull: NDArray[np.uint8], world: NDA
     return float((volume[concave] <= 0.5).mean()) if concave.any() else 1.0
 
 
-def _carving(drawings: NDArray[np.uint8], cameras: list[Camera], example: Example) -> list[float]:
-    return [iou(carve(drawings[:n], cameras[:n]), example.world) for n in range(1, VIEWS + 1)]
-
-
-def _same_up_to_half_turn(guess: str, truth: str) -> bool:
-    """Whether two three-quarter views are the same or a half turn about y apart: 037 and 217, and so on."""
-
-    def turn(name: str) -> int:
-        return int(name.removeprefix("quarter-")) % 180
-
-    return turn(guess) == turn(truth)
+def _hulls(drawings: NDArray[np.uint8], cameras: list[Camera]) -> list[NDArray[np.uint8]]:
+    """Carved from the first drawing, the first two, and so on."""
+    return [carve(drawings[:n], cameras[:n]) for n in range(1, VIEWS + 1)]

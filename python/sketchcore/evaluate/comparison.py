@@ -5,17 +5,17 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from sketchcore.evaluate.figure import Figure
+from sketchcore.evaluate.report import Report
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(Report):
     """What `compare` found.
 
     Attributes:
@@ -27,10 +27,6 @@ class Comparison:
     shapes: int
     networks: dict[str, list[Figure]]
     differences: dict[str, list[Figure]]
-
-    def to_dict(self) -> dict[str, Any]:
-        """The report as plain data."""
-        return asdict(self)
 
 
 def compare(reports: Sequence[str | os.PathLike[str]]) -> Comparison:

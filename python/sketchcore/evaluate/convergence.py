@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from sketchcore.camera import pack_cameras
 from sketchcore.evaluate.accuracy import ROUNDS, VIEWS, predictions
 from sketchcore.evaluate.figure import Figure
+from sketchcore.evaluate.report import Report
 from sketchcore.evaluate.testset import Example, count_shapes, load_testset
 from sketchcore.nets.models import Model
 from sketchcore.nets.sketches import Sketches
@@ -22,7 +22,7 @@ ORDERS = 4
 
 
 @dataclass(frozen=True)
-class Convergence:
+class Convergence(Report):
     """What `measure_convergence` found; lists over views count from one view.
 
     Attributes:
@@ -40,10 +40,6 @@ class Convergence:
     refined: Figure
     lost: list[float]
     orders: list[Figure]
-
-    def to_dict(self) -> dict[str, Any]:
-        """The report as plain data."""
-        return asdict(self)
 
 
 def measure_convergence(
@@ -63,15 +59,13 @@ def measure_convergence(
     network = np.empty((total, VIEWS, MANY_ROUNDS + 1))
     change = np.empty((total, VIEWS, MANY_ROUNDS))
     orders = np.empty((total, VIEWS - 1))
-    for i, example in enumerate(load_testset(shapes)):
+    for i, example in enumerate(load_testset(shapes, progress)):
         for v in range(VIEWS):
             volumes = predictions(model, example, v + 1, MANY_ROUNDS, tolerance=0)
             network[i, v] = [iou(volume, example.world) for volume in volumes]
             change[i, v] = [float(np.linalg.norm(b - a)) for a, b in itertools.pairwise(volumes)]
             if v > 0:
                 orders[i, v - 1] = _spread(model, example, v + 1)
-        if progress is not None:
-            progress(i + 1, total)
     means = network.mean(axis=0)
     return Convergence(
         shapes=total,

@@ -7,21 +7,22 @@ import os
 import statistics
 import subprocess
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rich.table import Table
 
-VIEWS = 4
-ROUNDS = 5
+from sketchcore.evaluate.accuracy import ROUNDS, VIEWS
+from sketchcore.evaluate.report import Report
+from sketchcore.evaluate.testset import load_testset
+
 SHAPES = 5
 PAPER = {"paper, TitanX": (140.0, 210.0, 280.0, 350.0), "paper, laptop CPU": (1000.0, 1500.0, 2200.0, 2900.0)}
 """Milliseconds for one to four views and five rounds, as the paper reports them."""
 
 
 @dataclass(frozen=True)
-class Cost:
+class Cost(Report):
     """What `measure_cost` measured.
 
     Attributes:
@@ -38,10 +39,6 @@ class Cost:
     first_call: float
     peak: float
     threads: int
-
-    def to_dict(self) -> dict[str, Any]:
-        """The figures as plain data."""
-        return asdict(self)
 
 
 def measure_cost(model: str | os.PathLike[str] | None = None, repetitions: int = 5) -> Cost:
@@ -63,8 +60,6 @@ def measure_cost(model: str | os.PathLike[str] | None = None, repetitions: int =
         raise ValueError(f"repetitions must be at least 1, got {repetitions}")
     if model is not None and not Path(model).is_file():
         raise FileNotFoundError(f"no weights at {os.fspath(model)}")
-    from sketchcore.evaluate.testset import load_testset
-
     objects = [
         {"shape": example.shape.to_json(), "cameras": [camera.packed.tolist() for camera in example.cameras[:VIEWS]]}
         for example in load_testset(SHAPES)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from sketchcore.evaluate.report import Report
 from sketchcore.nets.models import Model
 from sketchcore.outline import outline_iou, pieces
 from sketchcore.picture import save_picture
@@ -38,14 +38,10 @@ class Drawn:
 
 
 @dataclass(frozen=True)
-class Drawings:
+class Drawings(Report):
     """What `measure_drawings` found: one entry an object."""
 
     objects: list[Drawn]
-
-    def to_dict(self) -> dict[str, Any]:
-        """The report as plain data."""
-        return asdict(self)
 
 
 def measure_drawings(

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from PIL import Image
 from sketchcore.atomic import replacing
 from sketchcore.camera import VIEWPOINTS, Camera
 from sketchcore.evaluate.accuracy import ROUNDS, predictions
+from sketchcore.evaluate.report import Report
 from sketchcore.evaluate.testset import Example, count_shapes, load_testset
 from sketchcore.nets.models import Model
 from sketchcore.picture import shade
@@ -38,15 +38,11 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Failures:
+class Failures(Report):
     """What `measure_failures` found: the worst first; and how many shapes were looked at."""
 
     shapes: int
     worst: list[Failure]
-
-    def to_dict(self) -> dict[str, Any]:
-        """The report as plain data."""
-        return asdict(self)
 
 
 def measure_failures(
@@ -69,12 +65,10 @@ def measure_failures(
     """
     total = count_shapes(shapes)
     found: list[tuple[float, int, NDArray[np.float32], Example]] = []
-    for i, example in enumerate(load_testset(shapes)):
+    for i, example in enumerate(load_testset(shapes, progress)):
         volume = predictions(model, example, 1, ROUNDS)[-1]
         found.append((iou(volume, example.world), i, volume, example))
         found = sorted(found, key=lambda entry: entry[:2])[:SHOWN]
-        if progress is not None:
-            progress(i + 1, total)
     if out is not None:
         rows = [_row(example, volume) for _, _, volume, example in found]
         with replacing(Path(out) / "failures.png") as fresh:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from sketchcore.camera import pack_cameras
 from sketchcore.evaluate.accuracy import ROUNDS, VIEWS
 from sketchcore.evaluate.distort import STRENGTHS, distorted
 from sketchcore.evaluate.figure import Figure
+from sketchcore.evaluate.report import Report
 from sketchcore.evaluate.testset import Example, count_shapes, load_testset
 from sketchcore.nets.models import Model
 from sketchcore.nets.sketches import Sketches
@@ -24,7 +24,7 @@ TOGETHER = "all together"
 
 
 @dataclass(frozen=True)
-class Robustness:
+class Robustness(Report):
     """What `measure_robustness` found.
 
     Attributes:
@@ -36,10 +36,6 @@ class Robustness:
     shapes: int
     clean: list[Figure]
     drop: dict[str, list[list[Figure]]]
-
-    def to_dict(self) -> dict[str, Any]:
-        """The report as plain data."""
-        return asdict(self)
 
 
 def measure_robustness(
@@ -59,14 +55,12 @@ def measure_robustness(
     clean = np.empty((total, len(COUNTS)))
     kinds: dict[str, tuple[str, ...]] = {name: (name,) for name in STRENGTHS} | {TOGETHER: tuple(STRENGTHS)}
     spoilt = {kind: np.empty((total, 3, len(COUNTS))) for kind in kinds}
-    for i, example in enumerate(load_testset(shapes)):
+    for i, example in enumerate(load_testset(shapes, progress)):
         clean[i] = _scores(model, example, {}, i)
         for kind, names in kinds.items():
             for strength in (1, 2, 3):
                 faults = dict.fromkeys(names, strength)
                 spoilt[kind][i, strength - 1] = _scores(model, example, faults, i)
-        if progress is not None:
-            progress(i + 1, total)
     counts = range(len(COUNTS))
     return Robustness(
         shapes=total,

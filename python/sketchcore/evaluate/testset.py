@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.resources import files
@@ -67,8 +67,10 @@ def count_shapes(shapes: int | None) -> int:
     return TOTAL if shapes is None else shapes
 
 
-def load_testset(shapes: int | None = None) -> Iterator[Example]:
+def load_testset(shapes: int | None = None, progress: Callable[[int, int], None] | None = None) -> Iterator[Example]:
     """The first `shapes` examples; all 500 for None.
+
+    `progress` is called as `progress(done, total)` whenever the caller is done with one and asks for more.
 
     Raises:
         ValueError: for a number outside 1 ... 500.
@@ -77,6 +79,8 @@ def load_testset(shapes: int | None = None) -> Iterator[Example]:
     data = json.loads((files("sketchcore.evaluate") / "abstract-500.json").read_text())
     lens = (float(data["fov_degrees"]), float(data["near"]), float(data["far"]))
     names = list(VIEWPOINTS)
-    for entry in data["shapes"][:count]:
+    for done, entry in enumerate(data["shapes"][:count], start=1):
         cameras = tuple(Camera(c["position"], c["rotation"], *lens) for c in entry["cameras"])
         yield Example(Shape.from_json(entry), cameras, names[entry["cameras"][0]["viewpoint"]])
+        if progress is not None:
+            progress(done, count)
