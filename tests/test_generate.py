@@ -188,6 +188,22 @@ def test_hand_drawings_differ_and_truth_does_not(batch):
         assert 0.3 < (made > 127).sum() / (given > 0).sum() < 4
 
 
+def test_hand_drawings_are_out_of_place_by_no_more_than_asked():
+    pen = {"width": [1, 1], "bend": [0, 0], "gaps": [0, 0], "overshoots": [0, 0]}
+    exact = {"share": 1.0, "azimuth": 0.0, "elevation": 0.0, "roll": 0.0, "fov": 0.0, "shift": 0.0, "pen": pen}
+
+    def middles(hand):
+        drawn = generate(4, 48, config={"hand": hand}).drawings[:, 0] > 0
+        ends = [[np.flatnonzero(ink.any(axis=axis))[[0, -1]].mean() for axis in (0, 1)] for ink in drawn]
+        return np.array(ends)
+
+    moved = np.abs(middles({**exact, "shift": 12.0}) - middles(exact))
+    # Beside the shift itself: a point of the object nearer than its middle moves further, and pixels are whole.
+    assert moved.max() < 1.5 * 12
+    assert moved.max() > 6
+    assert np.median(moved) < 4, "small errors are the more common"
+
+
 def test_share_of_hand_drawings():
     half = generate(4, 64, config={"hand": {"share": 0.5}})
     exact = generate(4, 64)
@@ -285,6 +301,24 @@ def test_slabs_are_wedges_without_their_right_angle():
     assert cuts > 32
 
 
+def test_sheets_are_panels_of_one_width_in_a_chain():
+    sheets = {"share": 1.0, "panels": [3, 3], "thickness": [0.1, 0.1], "half_width": [0.3, 0.3]}
+    shapes = generate(0, 32, config={"grammar": {"steps": [1, 1], "sheets": sheets}}).packed_shapes
+    slanted = 0
+    for shape in shapes:
+        panels = shape[shape[:, 1] == 1]
+        assert len(panels) == 3
+        np.testing.assert_array_equal(panels[:, 4], 0)
+        np.testing.assert_allclose(panels[:, 7], panels[0, 7])
+        straight = panels[panels[:, 0] == 0]
+        np.testing.assert_allclose(straight[:, 5:7].min(axis=1), panels[0, 7] / 6, rtol=1e-9)
+        assert len(shape) == 3 + (3 - len(straight)), "one cut for each slanted panel"
+        slanted += 3 - len(straight)
+    assert 16 < slanted < 64
+    half = generate(0, 64, config={"grammar": {"steps": [1, 1], "sheets": {**sheets, "share": 0.5}}}).packed_shapes
+    assert 16 < sum(len(shape[shape[:, 1] == 1]) == 3 for shape in half) < 48
+
+
 def test_chamfered_cuboids_lose_edges_along_one_axis():
     only = {"cylinders": 0.0, "subtracted": 0.0, "steps": [1, 1], "chamfered": 1.0, "chamfer": [0.5, 0.5]}
     counts = set()
@@ -369,6 +403,10 @@ def test_the_default_config_is_complete_and_fresh():
         ({"grammar": {"chamfer": [0.2, 0.7]}}, r"grammar\.chamfer must be"),
         ({"grammar": {"slabs": 1.5}}, r"grammar\..*slabs.* between 0 and 1"),
         ({"grammar": {"slab_thickness": [0.5, 1]}}, r"grammar\.slab_thickness must be"),
+        ({"grammar": {"sheets": {"share": 2}}}, r"grammar\.sheets\.share must lie between 0 and 1"),
+        ({"grammar": {"sheets": {"panels": [0, 3]}}}, r"grammar\.sheets\.panels must be \[least, most\], from 1"),
+        ({"grammar": {"sheets": {"length": [0, 1]}}}, r"grammar\.sheets\.length, .* more than 0"),
+        ({"hand": {"shift": -1}}, r"hand\.shift must lie between 0 and 256 pixels"),
         ({"hand": {"azimuth": 60}}, "hand: angles must lie between 0 and 45"),
         ({"hand": {"fov": 0.9}}, "fov between 0 and 0.75"),
         ({"hand": {"pen": {"width": [3, 1]}}}, r"hand\.pen: every entry is \[least, most\]"),

@@ -66,17 +66,20 @@ impl Default for FreeConfig {
 pub struct HandConfig {
     /// Share of the drawings that are made so; the others are exact.
     pub share: f64,
-    /// Largest errors of the drawing camera: degrees, and share of the field of view.
+    /// Largest errors of the drawing camera, small ones being the more common: degrees, share of the field of view,
+    /// and pixels by which the drawing is out of place.
     pub azimuth: f64,
     pub elevation: f64,
     pub roll: f64,
     pub fov: f64,
+    pub shift: f64,
     pub pen: PenConfig,
 }
 
 impl Default for HandConfig {
     fn default() -> Self {
-        Self { share: 0.0, azimuth: 4.0, elevation: 4.0, roll: 2.0, fov: 0.08, pen: PenConfig::default() }
+        let pen = PenConfig::default();
+        Self { share: 0.0, azimuth: 10.0, elevation: 10.0, roll: 4.0, fov: 0.15, shift: 6.0, pen }
     }
 }
 
@@ -127,6 +130,9 @@ impl SampleConfig {
         let errors = [hand.azimuth, hand.elevation, hand.roll, hand.fov * 60.0];
         if !errors.iter().all(|e| (0.0..=45.0).contains(e)) {
             return bad("hand: angles must lie between 0 and 45 degrees, fov between 0 and 0.75");
+        }
+        if !(0.0..=256.0).contains(&hand.shift) {
+            return bad("hand.shift must lie between 0 and 256 pixels");
         }
         if !ranges.iter().all(|[from, to]| 0.0 <= *from && from <= to && *to <= 256.0) {
             return bad("hand.pen: every entry is [least, most] in pixels, between 0 and 256");
@@ -279,7 +285,7 @@ fn draw_cameras(
         .collect()
 }
 
-/// The camera that a person draws by: the given one, somewhat turned about the origin, at the same displacement.
+/// The camera that a person draws by: the given one, somewhat turned about the origin, at nearly the same displacement.
 fn hand_camera(
     config: &HandConfig,
     stand: &Stand,
@@ -287,15 +293,19 @@ fn hand_camera(
     shape: &Shape,
     random: &mut Random,
 ) -> Camera {
-    let displacement = camera.to_camera(DVec3::ZERO);
+    // The product of two even numbers: mostly small, seldom near the largest.
+    let mut error = |largest: f64| random.unit() * random.around(largest);
     let turned = Stand {
-        azimuth: stand.azimuth + random.around(config.azimuth),
-        elevation: stand.elevation + random.around(config.elevation),
+        azimuth: stand.azimuth + error(config.azimuth),
+        elevation: stand.elevation + error(config.elevation),
         fov: stand.fov,
     };
-    let turned = turned.camera(random.around(config.roll));
+    let turned = turned.camera(error(config.roll));
+    let fov = camera.fov_degrees * (1.0 + error(config.fov));
+    let pixel = 2.0 * camera.half_image * stand.distance() / IMAGE as f64;
+    let shift = DVec3::new(error(config.shift), error(config.shift), 0.0) * pixel;
+    let displacement = camera.to_camera(DVec3::ZERO) + shift;
     let by = DVec3::new(0.0, 0.0, stand.distance()) - displacement;
-    let fov = camera.fov_degrees * (1.0 + random.around(config.fov));
     let by = by * turned.room_for(by, &corners(shape));
     let turned = turned.displaced(by);
     Camera::new(turned.position, turned.axes, fov, camera.near, camera.far).unwrap_or(turned)

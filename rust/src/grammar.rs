@@ -1,5 +1,5 @@
 //! The paper's shape grammar (section 4.1): cuboids and cylinders grown onto each other, symmetric about z = 0;
-//! and wedges, which are ours, where a config asks for them.
+//! and wedges and bent sheets, which are ours, where a config asks for them.
 //!
 //! Only sums, products and comparisons of 64-bit floats are used, so a seed's shapes are bit-identical on every
 //! machine.
@@ -10,6 +10,9 @@ use crate::random::Random;
 use crate::voxel::{BitGrid, CELLS, SIDE};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
+
+mod sheet;
+pub use sheet::SheetConfig;
 
 /// Every amplitude and count of the grammar. Pairs are ranges that are drawn from evenly; sizes are relative to
 /// each other only, since the finished shape is scaled to the world grid.
@@ -31,6 +34,8 @@ pub struct GrammarConfig {
     /// How much of a side such a cut takes, at most one half; every second one takes that half, so that two of them meet in
     /// a ridge.
     pub chamfer: [f64; 2],
+    /// Bent sheets to begin with; the paper has none.
+    pub sheets: SheetConfig,
     /// Share of subtracted primitives.
     pub subtracted: f64,
     /// Half sizes of the first primitive.
@@ -68,6 +73,7 @@ impl Default for GrammarConfig {
             slab_thickness: [0.15, 0.5],
             chamfered: 0.0,
             chamfer: [0.1, 0.5],
+            sheets: SheetConfig::default(),
             subtracted: 0.33,
             first_half: [0.1, 0.4],
             half: [0.03, 0.25],
@@ -119,7 +125,7 @@ impl GrammarConfig {
             c if !(0.0..1.0).contains(&c.min_occupancy) => bad("min_occupancy must lie in [0, 1)"),
             c if c.min_extent >= SIDE => bad("min_extent must be less than 64"),
             c if c.attempts == 0 => bad("attempts must be at least 1"),
-            _ => Ok(()),
+            c => c.sheets.check(),
         }
     }
 
@@ -138,9 +144,13 @@ impl GrammarConfig {
     fn grow(&self, random: &mut Random) -> Vec<Primitive> {
         let steps = self.steps[0] + random.below(self.steps[1] - self.steps[0] + 1);
         let mut shape = Vec::new();
-        let first = self.primitive(self.first_half, true, random);
-        push_symmetric(&mut shape, first);
-        self.cut_edges(&mut shape, first, random);
+        if self.sheets.share > 0.0 && random.chance(self.sheets.share) {
+            shape = self.sheets.draw(random);
+        } else {
+            let first = self.primitive(self.first_half, true, random);
+            push_symmetric(&mut shape, first);
+            self.cut_edges(&mut shape, first, random);
+        }
         for _ in 1..steps {
             let additive = !random.chance(self.subtracted);
             let mut new = self.primitive(self.half, additive, random);

@@ -89,7 +89,14 @@ COMPACT = Preset(
     average=0.998,
     clip=1.0,
     generator={
-        "grammar": {"steps": [1, 10], "wedges": 0.2, "slabs": 0.3, "fitted": 0.5, "chamfered": 0.4},
+        "grammar": {
+            "steps": [1, 10],
+            "wedges": 0.2,
+            "slabs": 0.3,
+            "fitted": 0.5,
+            "chamfered": 0.5,
+            "sheets": {"share": 0.1},
+        },
         "free": {"share": 0.25},
         "hand": {"share": 0.7},
     },
