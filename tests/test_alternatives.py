@@ -82,6 +82,11 @@ def test_every_alternative_trains_resumes_and_is_measured(tmp_path: Path, name: 
     assert all(progress.iou is not None and 0 <= progress.waited < progress.seconds for progress in before)
     weights, _ = load_weights(tmp_path / "weights.safetensors")
     after = train(tiny(tmp_path, name, steps=3), resume=True, quiet=True)
+    run = tiny(tmp_path, name, steps=4)
+    truth = "fractional" if run.constants.truth == "binary" else "binary"
+    otherwise = replace(run, changes={**(run.changes or {}), "truth": truth})
+    with pytest.raises(ValueError, match="learns other things"):
+        train(otherwise, resume=True, quiet=True)
     assert after[-1].step == 3
     assert after[-1].samples > before[-1].samples
     assert load_checkpoint(tmp_path / f"{stages[-1]}.checkpoint.safetensors").progress == after[-1]

@@ -39,6 +39,9 @@ class Oracle:
     def first_predictions(self, samples: Sequence[Sketches]) -> Iterator[Volume]:
         return (next(self.rounds(sketches, 0)) for sketches in samples)
 
+    def in_place(self, sketches: Sketches, always: bool = False) -> Sketches:
+        return sketches
+
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         blank = np.full((64, 64, 64), 0.1, np.float32)
         return update_rounds(
@@ -79,6 +82,9 @@ class Carver:
         for sketches in samples:
             cameras = [sk.Camera.from_packed(row) for row in sketches.cameras]
             yield sk.carve(sketches.drawings, cameras).astype(np.float32)
+
+    def in_place(self, sketches: Sketches, always: bool = False) -> Sketches:
+        return sketches
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         yield from self.first_predictions([sketches])  # nothing changes afterwards: it stops at once
@@ -166,10 +172,12 @@ def test_reports_are_written_compared_and_refused(tmp_path: Path) -> None:
     (tmp_path / "bad.json").write_text("{}")
     with pytest.raises(ValueError, match="was not written by"):
         compare([tmp_path / "oracle.json", tmp_path / "bad.json"])
-    with pytest.raises(ValueError, match="--drawings goes with"):
+    with pytest.raises(ValueError, match="accuracy takes no --drawings"):
         measure_part("accuracy", folders=[tmp_path])
-    with pytest.raises(ValueError, match="one or more --drawings"):
+    with pytest.raises(ValueError, match="drawings takes no --shapes"):
         measure_part("drawings", shapes=3)
+    with pytest.raises(ValueError, match="one or more --drawings"):
+        measure_part("drawings")
 
 
 def test_bootstrap_interval_of_a_known_spread() -> None:

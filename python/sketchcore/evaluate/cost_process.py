@@ -8,7 +8,7 @@ import time
 
 
 def main() -> None:
-    """Reads the task from stdin and writes the figures to stdout, JSON both."""
+    """Reads the task from stdin; writes `[done, total]` after each shape, and the figures, a line of JSON each."""
     task = json.load(sys.stdin)
     started = time.perf_counter()
     import numpy as np  # what the package imports anyway
@@ -28,24 +28,25 @@ def main() -> None:
     counts = range(1, len(drawings) + 1)
     seconds: list[list[float]] = [[] for _ in counts]
     rounds: list[list[int]] = [[] for _ in counts]
-    for repetition in range(1 + task["repetitions"]):
-        for drawings, cameras in objects:
+    for done, (drawings, cameras) in enumerate(objects, 1):
+        for repetition in range(1 + task["repetitions"]):
             for n in counts:
                 begun = time.perf_counter()
                 solid = sk.reconstruct(drawings[:n], cameras[:n], model=model)
                 if repetition:  # the first time is for warming up
                     seconds[n - 1].append(time.perf_counter() - begun)
                     rounds[n - 1].append(len(solid.trace))
+        print(json.dumps([done, len(objects)]), flush=True)
     import torch
 
     figures = {
         "first_call": first_call,
         "seconds": seconds,
-        "rounds": [sum(each) / len(each) for each in rounds],
+        "rounds": rounds,
         "peak": peak_memory(),
         "threads": torch.get_num_threads(),
     }
-    json.dump(figures, sys.stdout)
+    print(json.dumps(figures))
 
 
 def peak_memory() -> int:

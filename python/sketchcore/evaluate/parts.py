@@ -31,24 +31,24 @@ class Part:
     Attributes:
         measure: makes its report.
         table: shows it.
+        takes: which of the options "shapes", "folders", "out", and "weights" instead of a model, `measure` has.
         plot: writes it as a PNG; None where there is nothing to plot.
-        by_shapes: whether it is measured on the fixed test set.
     """
 
     measure: Callable[..., Any]
     table: Callable[[Any], Table]
+    takes: tuple[str, ...] = ("shapes",)
     plot: Callable[[Any, Path], None] | None = None
-    by_shapes: bool = True
 
 
 PARTS: Mapping[str, Part] = MappingProxyType(
     {
-        "accuracy": Part(measure_accuracy, present.accuracy_table, plot_accuracy),
-        "convergence": Part(measure_convergence, present.convergence_table, plot_convergence),
-        "robustness": Part(measure_robustness, present.robustness_table, plot_robustness),
-        "cost": Part(measure_cost, cost_as_table, by_shapes=False),
-        "drawings": Part(measure_drawings, present.drawings_table, by_shapes=False),
-        "failures": Part(measure_failures, present.failures_table),
+        "accuracy": Part(measure_accuracy, present.accuracy_table, plot=plot_accuracy),
+        "convergence": Part(measure_convergence, present.convergence_table, plot=plot_convergence),
+        "robustness": Part(measure_robustness, present.robustness_table, plot=plot_robustness),
+        "cost": Part(measure_cost, cost_as_table, takes=("shapes", "weights")),
+        "drawings": Part(measure_drawings, present.drawings_table, takes=("folders", "out")),
+        "failures": Part(measure_failures, present.failures_table, takes=("shapes", "out")),
     }
 )
 
@@ -76,21 +76,19 @@ def measure_part(
         OSError: if the folder cannot be made.
     """
     part = PARTS[name]
+    if folders and "folders" not in part.takes:
+        raise ValueError(f"{name} takes no --drawings; those are for the part drawings")
+    if shapes is not None and "shapes" not in part.takes:
+        raise ValueError(f"{name} takes no --shapes: it is not measured on the test set")
+    if not folders and "folders" in part.takes:
+        raise ValueError(f"{name} takes one or more --drawings FOLDER")
     if out is not None:
         out.mkdir(exist_ok=True)
-    if part.by_shapes:
-        if folders:
-            raise ValueError(f"{name} is measured on the fixed test set; --drawings goes with the part drawings")
-        given = {} if shapes is None else {"shapes": shapes}
-        pictures = {"out": out} if name == "failures" else {}
-        return part.measure(load_model(weights), progress=progress, **given, **pictures)
-    if name == "cost":
-        if folders or shapes is not None:
-            raise ValueError("cost takes no --drawings and no --shapes")
-        return part.measure(weights)
-    if not folders or shapes is not None:
-        raise ValueError(f"{name} takes one or more --drawings FOLDER, and no --shapes")
-    return part.measure(load_model(weights), folders, out, progress)
+    options: dict[str, Any] = {"shapes": shapes, "folders": folders, "out": out, "weights": weights}
+    given = {option: options[option] for option in part.takes if options[option] is not None}
+    if "weights" not in part.takes:
+        given["model"] = load_model(weights)
+    return part.measure(progress=progress, **given)
 
 
 def write_part(name: str, report: Any, folder: Path) -> None:

@@ -48,25 +48,28 @@ def save_checkpoint(
     average: dict[str, Tensor],
     moments: Sequence[Mapping[int, Mapping[str, Any]]],
     progress: Progress,
+    task: Mapping[str, str],
 ) -> None:
-    """Writes weights, their average, each optimiser's moments and the progress, atomically, as safetensors."""
+    """Writes weights, their average, the optimisers' moments, the progress and the task, atomically, as safetensors."""
     tensors = {f"model.{name}": t for name, t in model.items()}
     tensors |= {f"average.{name}": t for name, t in average.items()}
     for number, states in enumerate(moments):
         for index, state in states.items():
             tensors |= {f"optimizer.{number}.{index}.{name}": torch.as_tensor(t) for name, t in state.items()}
     stored = {name: t.detach().cpu().contiguous().clone() for name, t in tensors.items()}
-    write_atomically(path, save(stored, metadata={"progress": json.dumps(asdict(progress))}))
+    said = {"progress": json.dumps(asdict(progress)), "task": json.dumps(dict(task))}
+    write_atomically(path, save(stored, metadata=said))
 
 
 @dataclass
 class Checkpoint:
-    """What `save_checkpoint` wrote: state dictionaries, moments by optimiser and parameter, and the progress."""
+    """What `save_checkpoint` wrote: state dictionaries, moments by optimiser and parameter, progress and task."""
 
     model: dict[str, Tensor]
     average: dict[str, Tensor]
     moments: dict[int, dict[int, dict[str, Tensor]]]
     progress: Progress
+    task: dict[str, str]
 
 
 def load_checkpoint(path: Path) -> Checkpoint:
@@ -83,7 +86,8 @@ def load_checkpoint(path: Path) -> Checkpoint:
     moments: dict[int, dict[int, dict[str, Tensor]]] = {}
     try:
         with safe_open(path, framework="pt") as file:
-            progress = Progress(**json.loads(file.metadata()["progress"]))
+            said = {name: json.loads(text) for name, text in file.metadata().items()}
+            progress, task = Progress(**said["progress"]), dict(said["task"])
             for key in file.keys():  # noqa: SIM118, a safetensors file is no mapping
                 kind, name = key.split(".", 1)
                 if kind == "optimizer":
@@ -94,4 +98,4 @@ def load_checkpoint(path: Path) -> Checkpoint:
                     (model if kind == "model" else average)[name] = file.get_tensor(key)
     except (SafetensorError, KeyError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is no checkpoint of sketchcore train: {error}") from error
-    return Checkpoint(model, average, moments, progress)
+    return Checkpoint(model, average, moments, progress, task)

@@ -135,6 +135,12 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
     results = []
     for index, name in enumerate(stages):
         found = load_checkpoint(checkpoints[name]) if checkpoints[name].exists() else None
+        if found and found.task != run.constants.task:
+            learnt, asked = (", ".join(task.values()) for task in (found.task, run.constants.task))
+            raise ValueError(
+                f"{checkpoints[name]} learns other things ({learnt}) than the preset {run.preset} ({asked}); "
+                "resume it with its own preset, or name another folder"
+            )
         # A later stage that has begun shows that this one is done.
         begun = any(checkpoints[later].exists() for later in stages[index + 1 :])
         stage = _stage(run, name, device, found, trained)
@@ -252,7 +258,7 @@ class _Loop:
     def _save(self) -> None:
         average = self.average.state_dict() if self.constants.average else {}
         moments = [optimizer.state_dict()["state"] for optimizer in self.optimizers]
-        save_checkpoint(self.path, self.stage.model.state_dict(), average, moments, self.progress)
+        save_checkpoint(self.path, self.stage.model.state_dict(), average, moments, self.progress, self.constants.task)
 
 
 @torch.no_grad()

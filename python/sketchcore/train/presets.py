@@ -72,6 +72,11 @@ class Preset:
         """What is trained, one after the other, each in an equal part of the time."""
         return STAGES[self.network]
 
+    @property
+    def task(self) -> dict[str, str]:
+        """What is learnt: a checkpoint goes on with nothing else."""
+        return {"network": self.network, "truth": self.truth}
+
 
 # Section 4.4: Adam with these constants, the single view first. Its 1,000,000 iterations are `--steps`.
 PAPER = Preset(network="paper", truth="fractional", batch=8, rate=2e-4, betas=(0.5, 0.999))
