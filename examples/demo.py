@@ -20,7 +20,7 @@ def main() -> None:
         drawings = [HERE / d["file"] for d in example["drawings"]]
         views = [d["view"] for d in example["drawings"]]
         started = time.perf_counter()
-        solid = sk.reconstruct(drawings, views)
+        solid = sk.reconstruct(drawings, views, align=True)
         seconds = time.perf_counter() - started
         path = OUT / f"{example['name']}.glb"
         solid.save(path)

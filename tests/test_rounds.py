@@ -39,6 +39,9 @@ class Oracle:
     def first_predictions(self, samples: Sequence[Sketches]) -> Iterator[Volume]:
         return (next(self.rounds(sketches, 0)) for sketches in samples)
 
+    def in_place(self, sketches: Sketches, always: bool = False) -> Sketches:
+        return sketches
+
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         return update_rounds(lambda view, prior: self.answer(sketches, view), sketches.cameras, iterations, start)
 

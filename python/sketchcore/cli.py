@@ -54,6 +54,7 @@ def reconstruct(
         typer.Option("--view", help="Viewpoint of each drawing, in order; a single one's may be left out."),
     ] = None,
     iterations: Annotated[int, typer.Option(help="Rounds over all drawings.")] = 5,
+    align: Annotated[bool, typer.Option(help="Look for where drawings made by hand belong, and move them.")] = True,
     picture: Annotated[Path | None, typer.Option(help="Also write a PNG of drawings and solid side by side.")] = None,
     model: Model = None,
     as_json: Json = False,
@@ -71,9 +72,11 @@ def reconstruct(
                 drawings,
                 view or None,
                 iterations=iterations,
+                align=align,
                 model=model,
                 progress=lambda number, total, volume: show(number),
             )
+            show(len(solid.trace), len(solid.trace))  # rounds end early where the solid has settled
         solid.save(out)
         if picture is not None:
             save_picture(solid, picture)
@@ -152,7 +155,7 @@ def evaluate(
     ] = "accuracy",
     model: Model = None,
     shapes: Annotated[
-        int | None, typer.Option(help="The first so many shapes (all 500; convergence 100, robustness 50).")
+        int | None, typer.Option(help="The first so many shapes (all 500; convergence 100, robustness 50, cost 25).")
     ] = None,
     drawings: Annotated[
         list[Path] | None, typer.Option("--drawings", help="Folders of people's drawings, for the part drawings.")

@@ -40,7 +40,8 @@ class Reconstruction:
         probability: float32 [64, 64, 64], world grid (x, y, z), probability of occupancy.
         views: the camera of each drawing.
         trace: root-mean-square change of the probability in each round that was run.
-        drawings: uint8 [n, 256, 256], the drawings as the network saw them, ink 255 on 0.
+        drawings: uint8 [n, 256, 256], the drawings as the network saw them, ink 255 on 0: those that were out of place,
+            where they belong.
         guessed: the name of the viewpoint that is nearest to the camera, where none was given.
     """
 
@@ -58,6 +59,7 @@ class Reconstruction:
         *,
         iterations: int = 5,
         tolerance: float = TOLERANCE,
+        align: bool | None = None,
         model: ModelLike = None,
         progress: Progress | None = None,
     ) -> Reconstruction:
@@ -71,6 +73,7 @@ class Reconstruction:
             view: the viewpoint's name, or the camera.
             iterations: rounds over all drawings, at most.
             tolerance: as for `reconstruct`.
+            align: as for `reconstruct`.
             model: as for `reconstruct`; None for the one that this reconstruction was made with.
             progress: as for `reconstruct`.
         """
@@ -78,10 +81,11 @@ class Reconstruction:
         views = (*self.views, as_camera(view))
         start = None if self.views else self.probability
         made = _run(
-            drawings,
+            Sketches(drawings, pack_cameras(views)),
             views,
             iterations,
             tolerance,
+            align if start is None else False,
             load_model(model if model is not None else self._model),
             progress,
             start,
@@ -151,6 +155,7 @@ def reconstruct(
     *,
     iterations: int = 5,
     tolerance: float = TOLERANCE,
+    align: bool | None = None,
     model: ModelLike = None,
     device: str | torch.device | None = None,
     progress: Progress | None = None,
@@ -170,6 +175,10 @@ def reconstruct(
         tolerance: what that means: they stop after a round that moved fewer voxels to the other side of 0.5 than
             this share of those that are occupied; the first round, which moves most, may move 3.5 times as many. At
             0 they never stop early.
+        align: True looks for the place and size at which each drawing is the most plausible one of an object that is
+            centred in the world, with a largest side of 1/1.2, and moves and scales it so: drawings made by hand are
+            off centre, too small or too large. That takes a second or two for each. None does it where a drawing is
+            plainly out of place, False never.
         model: None for the weights inside the package, a path to weights, or a loaded model (`load_model`).
         device: None for CUDA where there is one, else the CPU.
         progress: called as `progress(round, iterations, probability)` after the first prediction (round 0) and
@@ -201,21 +210,24 @@ def reconstruct(
     if not cameras:
         guessed, camera = guess_camera(chosen, images[0])
         cameras = (camera,)
-    return replace(_run(images, cameras, iterations, tolerance, chosen, progress), guessed=guessed)
+    made = _run(Sketches(images, pack_cameras(cameras)), cameras, iterations, tolerance, align, chosen, progress)
+    return replace(made, guessed=guessed)
 
 
 def _run(
-    drawings: NDArray[np.uint8],
+    sketches: Sketches,
     views: tuple[Camera, ...],
     iterations: int,
     tolerance: float,
+    align: bool | None,
     model: Model,
     progress: Progress | None,
     start: Volume | None = None,
 ) -> Reconstruction:
     before: Volume | None = None
     trace: list[float] = []
-    sketches = Sketches(drawings, pack_cameras(views))
+    if align is not False:
+        sketches = model.in_place(sketches, always=align is True)
     for number, volume in enumerate(until_settled(model.rounds(sketches, iterations, start), tolerance)):
         if progress is not None:
             progress(number, iterations, volume)
@@ -223,7 +235,7 @@ def _run(
             trace.append(float(np.sqrt(np.mean((volume - before) ** 2))))
         before = volume
     assert before is not None
-    return Reconstruction(before, views, tuple(trace), drawings, _model=model)
+    return Reconstruction(before, views, tuple(trace), sketches.drawings, _model=model)
 
 
 def load_model(model: ModelLike = None, device: str | torch.device | None = None) -> Model:

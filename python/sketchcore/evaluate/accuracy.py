@@ -107,7 +107,7 @@ def predictions(
 
     Where rounds end early, because the solid has settled, their last volume stands for those that were saved.
     """
-    sketches = Sketches(example.drawings[:views], pack_cameras(example.cameras[:views]))
+    sketches = model.in_place(Sketches(example.drawings[:views], pack_cameras(example.cameras[:views])))
     made = list(until_settled(model.rounds(sketches, rounds), tolerance))
     return made + [made[-1]] * (rounds + 1 - len(made))
 

@@ -83,6 +83,7 @@ def _spread(model: Model, example: Example, views: int) -> float:
     scores = []
     for first in range(min(views, ORDERS)):
         order = np.roll(np.arange(views), -first)
-        *_, volume = model.rounds(Sketches(example.drawings[order], cameras[order]), ROUNDS)
+        sketches = model.in_place(Sketches(example.drawings[order], cameras[order]))
+        *_, volume = model.rounds(sketches, ROUNDS)
         scores.append(iou(volume, example.world))
     return float(np.std(scores))

@@ -50,7 +50,7 @@ def measure_drawings(
     out: str | os.PathLike[str] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Drawings:
-    """Reconstructs the drawings of some folders.
+    """Reconstructs the drawings of some folders, moved to where they belong.
 
     A folder may hold `examples.json`, a list of `{"name": ..., "drawings": [{"file": ..., "view": ...}, ...]}`;
     otherwise each image in it is a drawing of an object of its own, whose viewpoint is guessed.
@@ -68,7 +68,7 @@ def measure_drawings(
     jobs = [job for folder in folders for job in _jobs(Path(folder))]
     objects = []
     for i, (name, files, views) in enumerate(jobs):
-        solid = reconstruct(files, views, model=model)
+        solid = reconstruct(files, views, align=True, model=model)
         seen = zip(solid.views, solid.drawings, strict=True)
         overlaps = [outline_iou(solid.probability, camera, drawing) for camera, drawing in seen]
         shown = views or [str(solid.guessed)]

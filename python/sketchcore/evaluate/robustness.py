@@ -82,6 +82,7 @@ def _scores(model: Model, example: Example, faults: dict[str, int], seed: int) -
     )
     scores = []
     for count in COUNTS:
-        *_, volume = until_settled(model.rounds(Sketches(drawings[:count], cameras[:count]), ROUNDS))
+        sketches = model.in_place(Sketches(drawings[:count], cameras[:count]))
+        *_, volume = until_settled(model.rounds(sketches, ROUNDS))
         scores.append(iou(volume, example.world))
     return scores

@@ -18,6 +18,7 @@ from sketchcore.nets.inference import CompactInference, flip_cells, whole
 from sketchcore.nets.multiscale import MultiscaleNet
 from sketchcore.nets.outlines import heed_outlines
 from sketchcore.nets.pieces import join_pieces
+from sketchcore.nets.placement import in_place, out_of_place
 from sketchcore.nets.precision import autocast, pick_device, place, unit
 from sketchcore.nets.singleview import SingleViewModel
 from sketchcore.nets.sketches import Sketches
@@ -38,6 +39,13 @@ class Model(Protocol):
         """Yields float32 [64, 64, 64] (x, y, z), probability of occupancy, for the drawings of each object.
 
         It is what the network says, with nothing mended yet.
+        """
+        ...
+
+    def in_place(self, sketches: Sketches, always: bool = False) -> Sketches:
+        """The drawings moved to where they belong, as far as they are elsewhere and the network can tell.
+
+        It is looked for where they are plainly out of place; or `always`.
         """
         ...
 
@@ -77,6 +85,20 @@ class CompactModel:
             for cells in self.net.decide(readings, None, [len(s) for s in batch]):
                 yield whole(cells[None])
 
+    def in_place(self, sketches: Sketches, always: bool = False) -> Sketches:
+        first = whole(self._look(sketches)[2])
+        wanted = always or out_of_place(first, sketches)
+        return in_place(self.first_predictions, sketches, first) if wanted else sketches
+
+    def _look(self, sketches: Sketches) -> tuple[Tensor, Tensor, Tensor]:
+        """The evidence of drawings, what is read in them, and what it says by itself."""
+        if self not in sketches.kept:
+            evidence = self.net.evidence([sketches])
+            readings = self.net.read([sketches], evidence)
+            sketches.kept[self] = evidence, readings, self.net.decide(readings, None, [len(sketches)])
+        seen: tuple[Tensor, Tensor, Tensor] = sketches.kept[self]
+        return seen
+
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         answers: dict[tuple[int, ...], Tensor] = {}
         known: Tensor | None = None
@@ -84,15 +106,17 @@ class CompactModel:
             half = 0.5 * (start + start[:, :, ::-1])[:, :, 32:]
             known = fold(torch.from_numpy(np.ascontiguousarray(half, np.float32)).to(self.device)[None, None])
         mean = known
-        evidence = self.net.evidence([sketches])
-        readings: dict[tuple[int, ...], Tensor] = {}
+        evidence, reading, answer = self._look(sketches)
+        readings = {LOOKS[0]: reading}
         for number in range(iterations + 1):
             look = LOOKS[number % len(LOOKS)]
             turn = flip_cells if 0 in look else _as_it_is
             if look not in readings:
                 readings[look] = self.net.read([reduce(Sketches.mirrored, look, sketches)], turn(evidence))
             prior = None if mean is None else turn(mean)
-            answers[look] = turn(self.net.decide(readings[look], prior, [len(sketches)]))
+            if prior is not None:
+                answer = turn(self.net.decide(readings[look], prior, [len(sketches)]))
+            answers[look] = answer
             mean = _balanced(answers)
             if known is not None:  # one prediction among those of the drawings
                 mean = (known + len(answers) * mean) / (1 + len(answers))
@@ -120,6 +144,9 @@ class PaperModel:
     def first_predictions(self, samples: Sequence[Sketches]) -> Iterator[Volume]:
         for sketches in samples:
             yield next(self.rounds(sketches, 0))
+
+    def in_place(self, sketches: Sketches, always: bool = False) -> Sketches:
+        return sketches
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         return update_rounds(

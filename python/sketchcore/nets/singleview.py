@@ -32,6 +32,9 @@ class SingleViewModel:
         for sketches in samples:
             yield next(self.rounds(sketches, 0))
 
+    def in_place(self, sketches: Sketches, always: bool = False) -> Sketches:
+        return sketches
+
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         """Yields the same float32 [64, 64, 64] (x, y, z) for the first prediction and each round.
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +24,12 @@ class Sketches:
     Attributes:
         drawings: uint8 [n, 256, 256], ink 255 on 0.
         cameras: float64 [n, 15], packed.
+        kept: what a network has made of them already, by the network: they are looked at more than once.
     """
 
     drawings: NDArray[np.uint8]
     cameras: NDArray[np.float64]
+    kept: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
 
     def __len__(self) -> int:
         return len(self.drawings)
