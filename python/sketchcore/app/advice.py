@@ -29,9 +29,9 @@ def unsure(volume: NDArray[np.generic]) -> Field:
 def best_view(volume: NDArray[np.generic], taken: Sequence[str]) -> tuple[str, dict[str, float]]:
     """The viewpoint whose drawing would help most, of those that nothing was drawn from yet.
 
-    A drawing shows what light reaches from its viewpoint. So along each ray of each viewpoint's camera grid the entropies
-    are added up, each times the probability that nothing stands before it: that much is undecided of what would be
-    seen.
+    A drawing shows what light reaches from its viewpoint. So along each ray of each viewpoint's camera grid the
+    entropies are added up, each times the probability that nothing stands before it: that much is undecided of what
+    would be seen.
 
     Args:
         volume: as for `unsure`.

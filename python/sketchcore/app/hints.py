@@ -1,16 +1,16 @@
 """How a drawing lies on its sheet: what novices get wrong before anything is reconstructed (paper, section 6.2).
 
-Two of the paper's six novices drew the object too small for its details or too large for the sheet, and the networks know
-objects at one distance only. What is usual was measured on drawings of the generator, which are made of objects that
-fill 1/1.2 of the cube: `generate(7, 300, views=3)`, exact lines, 642 three-quarter drawings and 258 from a side or the
-top. In percentiles 1 to 99:
+Two of the paper's six novices drew the object too small for its details or too large for the sheet, and the networks
+know objects at one distance only. What is usual was measured on drawings of the generator, which are made of objects
+that fill 1/1.2 of the cube: `generate(7, 300, views=3)`, exact lines, 642 three-quarter drawings and 258 from a side or
+the top. In percentiles 1 to 99:
 
     longest side of the ink's box, share of the sheet   0.38 to 0.76 three-quarter, 0.21 to 0.65 front and sides,
                                                         0.32 to 0.63 top
     its centre from the sheet's, to either side          0.10 three-quarter, 0.05 others
     from the box to the nearest border                   more than 18 pixels
 
-Whether an outline is open was measured on `generate(7, 300, views=2)`: at half and at a quarter of the resolution, where
+Whether an outline is open was measured on `generate(7, 300, views=2)`: at half and a quarter of the resolution, where
 wider gaps close, the inside of whole drawings grows by up to 8.5 % and 27 %, and it fills 58 % of their convex hull or
 more. With a gap of 40 to 70 pixels in the outline, more than half of those that are left open by it lie beyond that.
 """
@@ -73,7 +73,9 @@ def composition(drawing: NDArray[np.uint8], viewpoint: str) -> list[str]:
             f"{_LONGEST[quarter][0]:.0%}. Let it nearly fill the wireframe cube."
         )
     if max(map(abs, lies.offset)) > _OFFSET[quarter]:
-        hints.append(f"The object is off centre, too far {_where(lies, _OFFSET[quarter])}: draw it in the middle of the cube.")
+        hints.append(
+            f"The object is off centre, too far {_where(lies, _OFFSET[quarter])}: draw it in the middle of the cube."
+        )
     if _open(drawing, mask):
         hints.append("The outline seems to be open somewhere: close it, so that inside and outside can be told apart.")
     return hints

@@ -1,9 +1,9 @@
 """Pictures of paper sketches, as phones take them, to drawings.
 
 `sketchcore.load_drawing` takes scans and exports: it finds ink on paper of which the brightness changes slowly. A phone
-adds the hard shadows of a hand, and the table around the sheet. So the light is divided out first: the brightness of the
-paper is what is left of the picture when everything thinner than a few hundredths of it is closed over, which follows
-the edge of a shadow or of the sheet; and what lies outside the sheet is wiped.
+adds the hard shadows of a hand, and the table around the sheet. So the light is divided out first: the brightness of
+the paper is what is left of the picture when everything thinner than a few hundredths of it is closed over, which
+follows the edge of a shadow or of the sheet; and what lies outside the sheet is wiped.
 """
 
 # mypy: disable-error-code="no-untyped-call"
@@ -149,4 +149,6 @@ def _check(reflectance: Grey, sheet: Mask) -> None:
     if peak < _FAINT:
         raise ValueError(f"there is no ink in this picture: nothing stands out from the paper. {_MUST}")
     if float(np.percentile(darkness, 75)) > _TONES * peak or between > _SOFT * ink:
-        raise ValueError(f"this looks like a photograph, not like a drawing: it has tones where paper should be. {_MUST}")
+        raise ValueError(
+            f"this looks like a photograph, not like a drawing: it has tones where paper should be. {_MUST}"
+        )

@@ -7,11 +7,10 @@ volumes. Every method may be called from any of them.
 from __future__ import annotations
 
 import hashlib
-from collections import OrderedDict
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, replace
 from threading import RLock
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,53 +28,37 @@ from sketchcore.app.document import (
     sheet_to_json,
     stroke_to_json,
 )
+from sketchcore.app.history import History
 from sketchcore.app.ink import Stroke
+from sketchcore.app.order import Order, Progress
+from sketchcore.app.solids import Solid, Solids, as_solid
 from sketchcore.app.union import unite
 from sketchcore.camera import QUARTER_VIEWS
-from sketchcore.grids import SIDE, as_drawings
+from sketchcore.grids import as_drawings
 from sketchcore.strokes import trace
 
-Solid = NDArray[np.uint8]
-"""uint8 [64, 64, 64], world grid (x, y, z), probability of occupancy * 255. Read only."""
-
-_REMEMBERED = 16
-"""Solids of drawings as they were that are kept for undo, besides those of frozen parts."""
 _STRAY = 0.6
 """Pixels that a traced line may be straightened by."""
 
 
-@dataclass(frozen=True)
-class Progress:
-    """How far a reconstruction is.
+class Kept(NamedTuple):
+    """What has to be kept of a session.
 
     Attributes:
-        round: that was last handed back; 0 is the first prediction.
-        rounds: that will be run at most.
-        working: whether a thread is at it.
-        waiting: whether it waits for one.
+        document: as it is.
+        volumes: by key, all that the document and undo need.
+        solid: key of the current part's solid.
+        made_of: what that was made of.
+        revision: of the session.
+        news: lines of its history that were not kept yet; they go after those that were.
     """
 
-    round: int = 0
-    rounds: int = 0
-    working: bool = False
-    waiting: bool = False
-
-
-@dataclass(frozen=True)
-class Order:
-    """What is to be reconstructed.
-
-    Attributes:
-        part: id of the current part.
-        print: of its drawings: the same as long as they have the same ink.
-        drawings: uint8 [256, 256] each, ink 255 on 0, a three-quarter one first.
-        viewpoints: their names.
-    """
-
-    part: str
-    print: str
-    drawings: tuple[NDArray[np.uint8], ...]
-    viewpoints: tuple[str, ...]
+    document: Document
+    volumes: dict[str, Solid]
+    solid: str | None
+    made_of: str | None
+    revision: int
+    news: tuple[str, ...]
 
 
 class Session:
@@ -83,9 +66,6 @@ class Session:
 
     Attributes:
         id: 32 hexadecimal digits.
-        document: as it is now; immutable.
-        volumes: key -> solid: of the current part, of frozen parts, and what undo may bring back. Keys are made of
-            what is in them, so a key's solid never changes.
         revision: one more after every change of the document or of the solid.
         progress: of the reconstruction.
         trouble: what went wrong with the last reconstruction, a sentence; "" if nothing did.
@@ -94,7 +74,7 @@ class Session:
     def __init__(
         self,
         id: str | None = None,
-        document: Document | None = None,
+        history: History | None = None,
         volumes: dict[str, Solid] | None = None,
         solid: str | None = None,
         made_of: str | None = None,
@@ -104,8 +84,8 @@ class Session:
 
         Args:
             id: None for a fresh one.
-            document: None for an empty one.
-            volumes: by key; those of the document's parts, and the current solid.
+            history: its document, and what can be undone; None for an empty one.
+            volumes: by key; those of the parts of all documents, and the current solid.
             solid: key of the current solid.
             made_of: `Order.print` of the drawings that it was made from.
             revision: where to go on counting from.
@@ -115,23 +95,29 @@ class Session:
         """
         self.id = ink.check_id(id, "a session") if id is not None else ink.new_id()
         self.lock = RLock()
-        self.document = document if document is not None else Document()
-        self.volumes = {key: as_solid(volume) for key, volume in (volumes or {}).items()}
-        needed = {part.volume for part in self.document.parts} | ({solid} if solid is not None else set())
-        if missing := sorted(needed - set(self.volumes)):
-            raise ValueError(f"the session lacks the volume {missing[0]}, which its document needs")
+        self._history = history if history is not None else History(Document())
+        self._solids = Solids(volumes or {})
         self.revision = revision
         self.progress = Progress()
         self.trouble = ""
-        self._past: list[Document] = []
-        self._future: list[Document] = []
         self._solid = solid
         self._made_of = made_of if solid is not None else None
         self._solid_part = self.document.current if solid is not None else None
-        self._known: OrderedDict[str, str] = OrderedDict()
         if solid is not None and made_of is not None:
-            self._known[made_of] = solid
+            self._solids.learn(made_of, solid)
+        if missing := sorted(self._needed() - set(self.volumes)):
+            raise ValueError(f"the session lacks the volume {missing[0]}, which its document needs")
         self._scene: tuple[str, Solid] | None = None
+
+    @property
+    def document(self) -> Document:
+        """As it is now; immutable."""
+        return self._history.now
+
+    @property
+    def volumes(self) -> Mapping[str, Solid]:
+        """Key -> solid: of the current part, of frozen parts, and what undo may bring back. A key's never changes."""
+        return self._solids.volumes
 
     # What people do: each call is one step of undo, unless it changes nothing.
 
@@ -262,22 +248,22 @@ class Session:
     def undo(self) -> bool:
         """Takes the last step back; false if there is none."""
         with self.lock:
-            return self._step(self._past, self._future)
+            return self._history.undo() and self._moved()
 
     def redo(self) -> bool:
         """Takes the last step that was taken back again; false if there is none."""
         with self.lock:
-            return self._step(self._future, self._past)
+            return self._history.redo() and self._moved()
 
     @property
     def can_undo(self) -> bool:
         """Whether there is a step to take back."""
-        return bool(self._past)
+        return self._history.can_undo
 
     @property
     def can_redo(self) -> bool:
         """Whether there is a step that was taken back."""
-        return bool(self._future)
+        return self._history.can_redo
 
     # Reconstruction
 
@@ -315,15 +301,14 @@ class Session:
             False if it is of no use any more: the part was frozen, or all its drawings taken away.
         """
         solid = as_solid(volume)
-        key = key_of(solid)
         with self.lock:
             if order.part != self.document.current or not self.document.inked:
                 return False
-            self.volumes[key] = solid
-            self._solid, self._made_of, self._solid_part = key, order.print, order.part
-            self._known[order.print] = key
-            self._known.move_to_end(order.print)
-            self._forget()
+            key = self._solids.add(solid, order.print)
+            now = _print(self.document)
+            if order.print == now or self._made_of != now:  # else what is shown is the very one, and this is an older
+                self._solid, self._made_of, self._solid_part = key, order.print, order.part
+            self._solids.keep(self._needed())
             self.revision += 1
             return True
 
@@ -412,12 +397,16 @@ class Session:
             if stroke.kind == "ink"
         ]
 
-    def kept(self) -> tuple[Document, dict[str, Solid], str | None, str | None, int]:
-        """What has to be kept of it: document, its volumes by key, the solid's key, what that was made of, revision."""
+    def kept(self) -> Kept:
+        """What has to be kept of it."""
         with self.lock:
-            keys = {part.volume for part in self.document.parts} | ({self._solid} if self._solid is not None else set())
-            volumes = {key: self.volumes[key] for key in sorted(keys)}
-            return self.document, volumes, self._solid, self._made_of, self.revision
+            volumes = {key: self.volumes[key] for key in sorted(self._needed())}
+            return Kept(self.document, volumes, self._solid, self._made_of, self.revision, tuple(self._history.news()))
+
+    def told(self, count: int) -> None:
+        """Says that so many of `Kept.news` are kept."""
+        with self.lock:
+            self._history.told(count)
 
     # How it is done
 
@@ -426,73 +415,27 @@ class Session:
             self._change(self.document.with_part(change(self.document.part(part))))
 
     def _change(self, document: Document) -> None:
-        if document == self.document:
-            return
-        self._past.append(self.document)
-        self._future.clear()
-        self._become(document)
-        self._forget()
+        if document != self.document:
+            self._history.do(document)
+            self._moved()
+            self._solids.keep(self._needed())
 
-    def _step(self, source: list[Document], target: list[Document]) -> bool:
-        if not source:
-            return False
-        target.append(self.document)
-        self._become(source.pop())
+    def _moved(self) -> bool:
+        """After another document became the present one: finds its solid, or the part's stale one, or none."""
+        self.revision += 1
+        now = _print(self.document)
+        if not self.document.inked:
+            self._solid = self._made_of = self._solid_part = None
+        elif (known := self._solids.of(now)) is not None:
+            self._solid, self._made_of, self._solid_part = known, now, self.document.current
+        elif self._solid_part != self.document.current:
+            self._solid = self._made_of = self._solid_part = None
         return True
 
-    def _become(self, document: Document) -> None:
-        """Another document, and the solid that belongs to it: the one known, else the part's stale one, else none."""
-        self.document = document
-        self.revision += 1
-        now = _print(document)
-        if not document.inked:
-            self._solid = self._made_of = self._solid_part = None
-        elif now in self._known:
-            self._solid, self._made_of, self._solid_part = self._known[now], now, document.current
-            self._known.move_to_end(now)
-        elif self._solid_part != document.current:
-            self._solid = self._made_of = self._solid_part = None
-
-    def _forget(self) -> None:
-        """Drops the solids that neither the document nor undo needs."""
-        used = {part.volume for document in (*self._past, self.document, *self._future) for part in document.parts}
-        if self._solid is not None:
-            used.add(self._solid)
-        spare = [made_of for made_of, key in self._known.items() if key not in used]
-        for made_of in spare[: max(0, len(spare) - _REMEMBERED)]:
-            del self._known[made_of]
-        used.update(self._known.values())
-        self.volumes = {key: volume for key, volume in self.volumes.items() if key in used}
-
-
-def as_solid(volume: NDArray[np.generic]) -> Solid:
-    """A volume as sessions keep it; floats in [0, 1] are multiplied by 255.
-
-    Raises:
-        ValueError: for another shape, NaN, or values outside [0, 1].
-        TypeError: for another dtype.
-    """
-    array = np.asarray(volume)
-    if array.shape != (SIDE,) * 3:
-        raise ValueError(f"a solid must have shape [64, 64, 64], got {list(array.shape)}")
-    if array.dtype == np.uint8:
-        if not array.flags.writeable and array.flags.c_contiguous:
-            return array.view(np.uint8)
-        solid = array.astype(np.uint8, order="C")
-    elif array.dtype.kind == "f":
-        values = array.astype(np.float32)
-        if not ((values >= 0) & (values <= 1)).all():
-            raise ValueError("the probabilities of a solid must lie in [0, 1], without NaN")
-        solid = np.ascontiguousarray(np.rint(values * 255).astype(np.uint8))
-    else:
-        raise TypeError(f"a solid is uint8 or float, got {array.dtype}")
-    solid.setflags(write=False)
-    return solid
-
-
-def key_of(solid: Solid) -> str:
-    """What a solid is known by: 32 hexadecimal digits that its values alone decide."""
-    return hashlib.sha256(solid.tobytes()).hexdigest()[:32]
+    def _needed(self) -> set[str]:
+        """Keys of the volumes without which something could not be shown or undone."""
+        needed = {part.volume for document in self._history.documents() for part in document.parts}
+        return needed if self._solid is None else needed | {self._solid}
 
 
 def _print(document: Document) -> str:

@@ -12,14 +12,16 @@ import io
 import json
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from sketchcore.app.document import Document, fields, from_json, to_json
+from sketchcore.app.history import History
 from sketchcore.app.ink import check_id
-from sketchcore.app.session import Session, Solid, as_solid, key_of
+from sketchcore.app.session import Kept, Session
+from sketchcore.app.solids import Solid, as_solid, key_of
 from sketchcore.camera import VIEWPOINTS
 from sketchcore.grids import SIDE
 
@@ -36,8 +38,9 @@ _DOCUMENT = "document.json"
 _FIELDS = ("format", "version", "document", "solid", "made_of", "cameras")
 
 
-def describe(document: Document, solid: str | None, made_of: str | None) -> dict[str, Any]:
+def describe(kept: Kept) -> dict[str, Any]:
     """What `document.json` holds, as plain data; the cameras are for other readers."""
+    document = kept.document
     names = dict.fromkeys(
         sheet.viewpoint for sheets in (document.sheets, *(part.sheets for part in document.parts)) for sheet in sheets
     )
@@ -45,33 +48,28 @@ def describe(document: Document, solid: str | None, made_of: str | None) -> dict
         "format": FORMAT,
         "version": VERSION,
         "document": to_json(document),
-        "solid": solid,
-        "made_of": made_of,
+        "solid": kept.solid,
+        "made_of": kept.made_of,
         "cameras": {name: VIEWPOINTS[name].packed.tolist() for name in names},
     }
 
 
-def restore(data: object, volume: Callable[[str], Solid], id: str | None = None, revision: int = 0) -> Session:
-    """The session that `describe` told of.
+def recall(data: object) -> tuple[Document, str | None, str | None]:
+    """The document that `describe` told of, the key of its solid, and what that was made of.
 
     Args:
         data: plain data, from anywhere.
-        volume: gives the solid of a key; it raises ValueError where there is none.
-        id: the session's; None for a new one.
-        revision: where to go on counting from.
 
     Raises:
-        ValueError: for whatever is wrong with the data or a volume.
+        ValueError: for whatever is wrong with it.
     """
     entries = fields(data, "a session", _FIELDS)
     if entries["format"] != FORMAT or entries["version"] != VERSION:
         found = f"{str(entries['format'])[:40]!r}, version {str(entries['version'])[:40]!r}"
         raise ValueError(f"sessions are {FORMAT!r}, version {VERSION}; this is {found}")
     _check_cameras(entries["cameras"])
-    document = from_json(entries["document"])
     solid, made_of = (None if entries[n] is None else check_id(entries[n], "a volume") for n in ("solid", "made_of"))
-    keys = {part.volume for part in document.parts} | ({solid} if solid is not None else set())
-    return Session(id, document, {key: volume(key) for key in sorted(keys)}, solid, made_of, revision)
+    return from_json(entries["document"]), solid, made_of
 
 
 def _check_cameras(cameras: object) -> None:
@@ -108,13 +106,14 @@ def parse_json(text: bytes, what: str) -> Any:
 
 def write_session(session: Session) -> bytes:
     """The session file: the drawings of all parts, the cameras, and the volumes; not what could be undone."""
-    document, volumes, solid, made_of, _ = session.kept()
+    kept = session.kept()
+    needed = {part.volume for part in kept.document.parts} | ({kept.solid} if kept.solid is not None else set())
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr(_DOCUMENT, json.dumps(describe(document, solid, made_of), allow_nan=False))
-        for key, volume in volumes.items():
+        archive.writestr(_DOCUMENT, json.dumps(describe(kept), allow_nan=False))
+        for key in sorted(needed):
             array = io.BytesIO()
-            np.save(array, volume, allow_pickle=False)
+            np.save(array, kept.volumes[key], allow_pickle=False)
             archive.writestr(f"volumes/{key}.npy", array.getvalue())
     return file.getvalue()
 
@@ -132,9 +131,12 @@ def read_session(data: bytes) -> Session:
             if len(archive.infolist()) > _MAX_ENTRIES:
                 raise ValueError(f"a session file has up to {_MAX_ENTRIES} entries, this one more")
             record = parse_json(_entry(archive, _DOCUMENT, MAX_DOCUMENT), "the session's document")
-            return restore(record, lambda key: _volume(archive, key))
+            document, solid, made_of = recall(record)
+            keys = {part.volume for part in document.parts} | ({solid} if solid is not None else set())
+            volumes = {key: _volume(archive, key) for key in sorted(keys)}
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError) as error:
         raise ValueError(f"this is no session file of sketchcore, or it is damaged: {error}") from error
+    return Session(None, History(document), volumes, solid, made_of)
 
 
 def _entry(archive: zipfile.ZipFile, name: str, most: int) -> bytes:

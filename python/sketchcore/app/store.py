@@ -9,22 +9,29 @@ from __future__ import annotations
 import gzip
 import io
 import json
+import logging
+import os
 import re
 import shutil
 import threading
 import weakref
 import zlib
 from collections import OrderedDict
+from collections.abc import Collection, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from sketchcore.app.session import Session, Solid
-from sketchcore.app.sessionfile import describe, parse_json, parse_volume, read_session, restore, write_session
+from sketchcore.app.document import Document
+from sketchcore.app.history import History
+from sketchcore.app.session import Session
+from sketchcore.app.sessionfile import describe, parse_json, parse_volume, read_session, recall, write_session
+from sketchcore.app.solids import Solid
 from sketchcore.atomic import write_atomically
 
+_log = logging.getLogger(__name__)
 _ID = re.compile(r"[0-9a-f]{32}")
 _AT_HAND = 64
 """Sessions that stay in memory without being in use."""
@@ -99,14 +106,16 @@ class Store:
         with saving:  # whoever saves later saves what is newer
             if self._held.get(session.id) is not session:
                 return
-            document, volumes, solid, made_of, revision = session.kept()
+            kept = session.kept()
             place = self.folder / session.id
-            for key, volume in volumes.items():
+            for key, volume in kept.volumes.items():
                 _write_volume(place / "volumes" / f"{key}.npy.gz", volume)
-            record = {"revision": revision, **describe(document, solid, made_of)}
+            record = {"revision": kept.revision, **describe(kept)}
             write_atomically(place / "session.json", json.dumps(record, allow_nan=False).encode())
+            _append(place / "history.jsonl", kept.news)
+            session.told(len(kept.news))
             for file in (place / "volumes").iterdir():
-                if file.name.startswith(".") or file.name.split(".")[0] not in volumes:
+                if file.name.startswith(".") or file.name.split(".")[0] not in kept.volumes:
                     file.unlink(missing_ok=True)
 
     def delete(self, id: str) -> None:
@@ -156,11 +165,55 @@ class Store:
         return session
 
     def _load(self, place: Path) -> Session:
-        record = dict(_read(place))
+        record = _read(place)
         revision = record.pop("revision", None)
         if type(revision) is not int:
             raise ValueError(f"the session {place.name} is damaged: it has no revision")
-        return restore(record, lambda key: _read_volume(place / "volumes" / f"{key}.npy.gz", key), place.name, revision)
+        document, solid, made_of = recall(record)
+        history = _read_history(
+            place / "history.jsonl", document, {path.name for path in (place / "volumes").iterdir()}
+        )
+        keys = {part.volume for one in history.documents() for part in one.parts}
+        if solid is not None:
+            keys.add(solid)
+        volumes = {key: _read_volume(place / "volumes" / f"{key}.npy.gz", key) for key in sorted(keys)}
+        return Session(place.name, history, volumes, solid, made_of, revision)
+
+
+def _append(path: Path, lines: Sequence[str]) -> None:
+    """Adds lines to a history; if it begins anew, in the place of what was there."""
+    text = "".join(f"{line}\n" for line in lines).encode()
+    if lines and lines[0].startswith('{"begin"'):
+        write_atomically(path, text)
+    elif lines:
+        with path.open("ab") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def _read_history(path: Path, document: Document, files: Collection[str]) -> History:
+    """What can be undone. The document counts, and whatever the history lacks: it is written after it.
+
+    Args:
+        path: of the history.
+        document: as it was kept.
+        files: names of the volumes that there are.
+    """
+    try:
+        *lines, rest = path.read_bytes().split(b"\n")
+        history = History.replay(lines)
+        if any(f"{part.volume}.npy.gz" not in files for one in history.documents() for part in one.parts):
+            raise ValueError("the history needs a volume that is gone")
+    except (OSError, ValueError) as error:
+        _log.warning("what could be undone is lost: %s", error)
+        return History(document)
+    if history.now != document:
+        history.do(document)
+        history.retell()
+    elif rest:
+        history.retell()
+    return history
 
 
 def _read(place: Path) -> dict[str, Any]:

@@ -8,7 +8,8 @@ from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from sketchcore.app.session import Order, Progress, Session
+from sketchcore.app.order import Order, Progress
+from sketchcore.app.session import Session
 
 ROUNDS = 5
 """Over all drawings, at most; fewer where the solid has settled."""
