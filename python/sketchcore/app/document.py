@@ -16,7 +16,7 @@ from sketchcore.camera import VIEWPOINTS
 
 MAX_STROKES = 5_000
 """Of one drawing."""
-MAX_TOTAL_POINTS = 1_000_000
+MAX_TOTAL_POINTS = 500_000
 """Of all strokes of a document."""
 MAX_PARTS = 64
 MAX_NAME = 80

@@ -30,7 +30,7 @@ VERSION = 1
 SUFFIX = ".sketchcore"
 MAX_FILE = 64 * 2**20
 """Bytes of a session file."""
-MAX_DOCUMENT = 64 * 2**20
+MAX_DOCUMENT = 24 * 2**20
 """Bytes of its document, unpacked."""
 _VOLUME_BYTES = SIDE**3 + 1024  # with the header of .npy
 _MAX_ENTRIES = 1 + 2 * 64
