@@ -53,4 +53,5 @@ class Hub:
 def summary(session: Session) -> dict[str, Any]:
     """What tells a page whether to ask for more: revision, keys of solid and scene, progress and trouble."""
     state = session.state()
-    return {key: state[key] for key in ("revision", "solid", "scene", "stale", "trouble")} | state["progress"]
+    kept = {key: state[key] for key in ("revision", "solid", "scene", "stale", "trouble")}
+    return {**kept, **state["progress"]}

@@ -25,8 +25,8 @@ class TooLargeError(ValueError):
 class Guard:
     """ASGI middleware that refuses foreign pages and bodies beyond all limits.
 
-    A page of another site could otherwise talk to a server on the user's own machine: by a form, which the browser marks
-    with its origin, or by a name that it lets point to 127.0.0.1.
+    A page of another site could otherwise talk to a server on the user's own machine: by a form, which the browser
+    marks with its origin, or by a name that it lets point to 127.0.0.1.
     """
 
     def __init__(self, app: App, hosts: Iterable[str] | None = None, largest: int = LARGEST) -> None:

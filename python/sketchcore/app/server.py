@@ -1,4 +1,6 @@
-"""The routes under /api: what a page asks of a session, as HTTP. All work is done in threads, so that none waits for another.
+"""The routes under /api: what a page asks of a session, as HTTP.
+
+All work is done in threads, so that none waits for another.
 
 A change carries `op`, a random name of its own. One that comes a second time, since its answer was lost, is not done
 again: pages repeat what they are not sure has arrived.
@@ -14,7 +16,6 @@ import threading
 import unicodedata
 from collections import OrderedDict
 from collections.abc import Callable, Coroutine, Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -33,7 +34,7 @@ from sketchcore.app.guard import TooLargeError
 from sketchcore.app.session import Session
 from sketchcore.app.sessionfile import MAX_FILE, SUFFIX
 from sketchcore.app.store import Store
-from sketchcore.app.workers import Workers
+from sketchcore.app.workers import Reconstruct, Workers
 from sketchcore.mesh import MESH_SUFFIXES, extract_mesh, save_mesh
 from sketchcore.reconstruction import load_model
 from sketchcore.viewpoint import guess_viewpoint
@@ -98,7 +99,14 @@ class Server:
         open: whether anyone may see the list of all sessions; not so where others than the user can reach the server.
     """
 
-    def __init__(self, store: Store, model: Any = None, threads: int = 1, open: bool = True) -> None:
+    def __init__(
+        self,
+        store: Store,
+        model: Any = None,
+        threads: int = 1,
+        open: bool = True,
+        reconstruct: Reconstruct | None = None,
+    ) -> None:
         """Starts the workers.
 
         Args:
@@ -106,12 +114,13 @@ class Server:
             model: as for `sketchcore.reconstruct`.
             threads: how many reconstructions run at a time.
             open: see the class.
+            reconstruct: None for `sketchcore.reconstruct`.
         """
         self.store = store
         self.hub = Hub()
         self.open = open
         self.model = model
-        self.workers = Workers(model, threads, self._worked)
+        self.workers = Workers(model, threads, self._worked, reconstruct)
         self._lock = threading.Lock()
         self._done: OrderedDict[tuple[str, str], None] = OrderedDict()
         self._packed: OrderedDict[str, bytes] = OrderedDict()
@@ -142,9 +151,10 @@ class Server:
         if missing:
             raise ValueError(f"{name} needs {', '.join(_CHANGES[name])}; there is no {missing[0]}")
         with session.lock:
-            if not self._is_new(session, body.get("op")):
+            if self._was_done(session, body.get("op")):
                 return session.state()
             _apply(session, name, body)
+            self._remember(session, body.get("op"))
         if name == "reconstruct":
             self.workers.submit(session)
         elif not session.document.inked:
@@ -157,17 +167,16 @@ class Server:
         self.hub.tell(session)
         return session.state()
 
-    def _is_new(self, session: Session, op: object) -> bool:
-        if not isinstance(op, str):
-            return True
-        key = session.id, op[:64]
+    def _was_done(self, session: Session, op: object) -> bool:
         with self._lock:
-            if key in self._done:
-                return False
-            self._done[key] = None
-            while len(self._done) > _REMEMBERED:
-                self._done.popitem(last=False)
-        return True
+            return isinstance(op, str) and (session.id, op[:64]) in self._done
+
+    def _remember(self, session: Session, op: object) -> None:
+        if isinstance(op, str):
+            with self._lock:
+                self._done[session.id, op[:64]] = None
+                while len(self._done) > _REMEMBERED:
+                    self._done.popitem(last=False)
 
     def volume(self, session: Session, key: str) -> tuple[str, bytes]:
         """The name of a volume's content, and its 64^3 bytes, gzipped."""
@@ -245,10 +254,8 @@ def _attachment(content: bytes, name: str, suffix: str, media: str) -> Response:
     """A file to save, named after the session."""
     plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
     plain = re.sub(r"[^A-Za-z0-9 _-]+", "", plain).strip() or "sketch"
-    headers = {
-        "Content-Disposition": f"attachment; filename=\"{plain}{suffix}\"; filename*=UTF-8''{quote(name, safe='')}{suffix}"
-    }
-    return Response(content, media_type=media, headers=headers)
+    names = f"filename=\"{plain}{suffix}\"; filename*=UTF-8''{quote(name, safe='')}{suffix}"
+    return Response(content, media_type=media, headers={"Content-Disposition": f"attachment; {names}"})
 
 
 _MEDIA = {".glb": "model/gltf-binary", ".obj": "model/obj", ".stl": "model/stl", ".ply": "application/octet-stream"}
