@@ -149,11 +149,12 @@ def train(
 @app.command()
 def evaluate(
     part: Annotated[
-        str, typer.Argument(help="What to measure: accuracy, convergence, robustness, cost, drawings, failures.")
+        str,
+        typer.Argument(help="What to measure: accuracy, convergence, robustness, cost, drawings, failures, advice."),
     ] = "accuracy",
     model: Model = None,
     shapes: Annotated[
-        int | None, typer.Option(help="The first so many shapes (all 500; convergence 100, robustness 50).")
+        int | None, typer.Option(help="The first so many shapes (all 500; convergence and advice 100, robustness 50).")
     ] = None,
     drawings: Annotated[
         list[Path] | None, typer.Option("--drawings", help="Folders of people's drawings, for the part drawings.")
@@ -167,7 +168,8 @@ def evaluate(
 
     accuracy: IoU by views and rounds, concavities, carving, ceiling, viewpoint. convergence: ten rounds, and orders of
     the drawings. robustness: faulty drawings. cost: time and memory. drawings: outlines of people's drawings, pieces,
-    and pictures from four sides. failures: the shapes that come out worst, with a picture.
+    and pictures from four sides. failures: the shapes that come out worst, with a picture. advice: what the second
+    viewpoint that the app advises brings.
     """
     with _errors():
         from sketchcore.evaluate.parts import PARTS, measure_part, write_part

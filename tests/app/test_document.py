@@ -64,7 +64,9 @@ def test_what_is_wrong_is_said(path: list[Any], value: object, message: str) -> 
         from_json(data)
 
 
-@pytest.mark.parametrize("path", [[], ["sheets", 0], ["sheets", 0, "strokes", 0], ["parts", 0], ["parts", 0, "placement"]])
+@pytest.mark.parametrize(
+    "path", [[], ["sheets", 0], ["sheets", 0, "strokes", 0], ["parts", 0], ["parts", 0, "placement"]]
+)
 def test_every_entry_is_needed_and_no_other_is_known(path: list[Any]) -> None:
     whole = json.loads(json.dumps(to_json(DOCUMENT)))
     for name in list(_at(whole, path)):

@@ -103,7 +103,10 @@ def test_what_is_kept_is_not_told_twice() -> None:
         ["begin", b'{"do": {"name": "a", "current": "b", "sheets": [7], "parts": []}}'],
         ["begin", b'{"do": {"name": "a", "current": "b", "sheets": [], "parts": [{"id": 3}]}}'],
         ["begin", b'{"do": {"name": "a", "current": "b", "sheets": [{"viewpoint": [], "strokes": []}], "parts": []}}'],
-        ["begin", b'{"do": {"name": "a", "current": "b", "sheets": [{"viewpoint": "top", "strokes": 5}], "parts": []}}'],
+        [
+            "begin",
+            b'{"do": {"name": "a", "current": "b", "sheets": [{"viewpoint": "top", "strokes": 5}], "parts": []}}',
+        ],
     ],
 )
 def test_what_is_damaged_is_refused(lines: list[bytes | str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -136,14 +137,14 @@ def test_nothing_is_left_under_the_eraser_and_all_beside_it(
         places = [np.empty((0, 2))]
         for one in strokes:
             xy = one.xy
-            for a, b in zip(xy, xy[1:], strict=False):
+            for a, b in itertools.pairwise(xy):
                 places.append(a + np.linspace(0, 1, 50)[:, None] * (b - a))
             places.append(xy)
         return np.concatenate(places)
 
     def distance(places: np.ndarray) -> np.ndarray:
         steps = [np.array(path[:1])]
-        for a, b in zip(path, path[1:], strict=False):
+        for a, b in itertools.pairwise(path):
             steps.append(np.array(a) + np.linspace(0, 1, 400)[:, None] * (np.array(b) - np.array(a)))
         return np.hypot(*(places[:, None] - np.concatenate(steps)[None]).transpose(2, 0, 1)).min(axis=1)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import zipfile
@@ -111,7 +112,7 @@ def _huge_npy() -> bytes:
     [
         (lambda e: e.pop("document.json"), "no document.json"),
         (lambda e: e.update({"document.json": b"{"}), "is damaged"),
-        (lambda e: e.update({"document.json": b"\"\xff\""}), "UTF-8"),
+        (lambda e: e.update({"document.json": b'"\xff"'}), "UTF-8"),
         (lambda e: e.update({"document.json": b"[" * 200_000}), "nested too deeply"),
         (lambda e: e.update({"document.json": b"[1]"}), "a session must be an object"),
         (lambda e: e.update({"document.json": b'{"format": NaN}'}), "holds NaN"),
@@ -154,10 +155,8 @@ def test_every_cut_and_many_flips_are_refused_or_harmless() -> None:
     for _ in range(150):
         broken = bytearray(data)
         broken[random.integers(len(data))] ^= 1 << random.integers(8)
-        try:
+        with contextlib.suppress(ValueError):
             assert read_session(bytes(broken)).document == whole
-        except ValueError:
-            pass
     for length in random.integers(0, len(data) - 1, 30):
         with pytest.raises(ValueError, match="session"):
             read_session(data[:length])
