@@ -68,7 +68,7 @@ class AppServer:
         environment = {key: value for key, value in os.environ.items() if not key.startswith(("NICEGUI", "PYTEST"))}
         self.process = subprocess.Popen(command, stdout=self.log, stderr=self.log, env=environment)
         begun = time.monotonic()
-        while time.monotonic() - begun < PATIENCE / 1000:
+        while time.monotonic() - begun < 3 * PATIENCE / 1000:
             if self.process.poll() is not None:
                 break
             try:
@@ -77,7 +77,9 @@ class AppServer:
             except OSError:
                 time.sleep(0.2)
         self.stop()
-        raise RuntimeError(f"the server did not start: {Path(self.log.name).read_text()[-2000:]}")
+        raise RuntimeError(
+            f"the server did not start ({self.process.returncode}): {Path(self.log.name).read_text()[-2000:]}"
+        )
 
     def kill(self) -> None:
         """As a crash would: nothing is said to it."""

@@ -131,7 +131,7 @@ def test_the_advised_view_is_a_click_away(boxed):
 def test_uncertainty_colours_the_surface_on_request(boxed):
     boxed.page.locator("[data-action=doubt]").click()
     boxed.page.wait_for_function(f"{STAGE}.view.unsure && {STAGE}.view.look.doubt")
-    assert boxed.page.evaluate(f"Math.max(...{STAGE}.view.unsure)") > 100
+    assert boxed.page.evaluate(f"{STAGE}.view.unsure.reduce((a, b) => Math.max(a, b))") > 100
 
 
 def test_a_photo_becomes_a_drawing_that_can_be_edited(boxed, hand):
@@ -205,7 +205,7 @@ def test_the_example_plays_and_leaves_things_as_they_were(server, new_hand):
     hand.page.wait_for_function(
         f"{DESK}.state.id !== '{own}' && {DESK}.state.sheets.some((sheet) => sheet.strokes.length > 2)"
     )
-    assert hand.page.locator(".note.tour").inner_text().startswith("1. Draw")
+    assert "1. Draw an object" in hand.page.locator(".note.tour").inner_text()
     hand.press("skip")
     hand.page.wait_for_function(f"{DESK}.state.id === '{own}'")
     hand.ready()

@@ -8,7 +8,11 @@ from typing import Any
 
 _FOLDER = Path(__file__).parent / "scenes"
 
-SCENES: dict[str, str] = {}
+SCENES = {
+    "house": "House with a slanted roof, a tree and a shed",
+    "table": "Table with books and a mug",
+    "train": "Toy train",
+}
 """Name -> what people call it; NAME.sketchcore is its file."""
 
 

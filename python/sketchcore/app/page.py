@@ -35,7 +35,7 @@ class Action:
 ACTIONS = (
     Action("draw", "Draw", "edit", ("d",)),
     Action("navigate", "Navigate", "3d_rotation", ("n",)),
-    Action("switch", "Draw or navigate", "", ("Tab",)),
+    Action("switch", "Draw or navigate", "", ("m",)),
     Action("pen", "Pen", "edit", ("p",)),
     Action("construction", "Construction line, not sent", "architecture", ("c",)),
     Action("ellipse", "Ellipse about an axis", "circle", ("e",)),

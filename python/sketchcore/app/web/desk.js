@@ -4,6 +4,7 @@ import { reactive } from "vue";
 import { Outbox, Refused, listen, request, volume } from "./link.js";
 
 const FOLLOW = 1100; // milliseconds after the last change of a drawing until the shape follows
+const AGAIN = 1500; // milliseconds until a volume that could not be had is asked for again
 const CHECK = 700; // milliseconds after the last stroke until the composition is looked at
 
 const EMPTY = {
@@ -178,8 +179,10 @@ export class Desk {
       if (bytes && this.now.doubt) this.heard.unsure(await volume(state.id, `unsure?of=${wanted}`));
     } catch (error) {
       if (error instanceof Refused) this.loaded = wanted;
+      else setTimeout(() => this.loadScene(), AGAIN);
     }
     this.loading = false;
+    if (this.loaded !== wanted) return;
     const { state: next } = this;
     const current = next.solid || next.parts.some((part) => part.visible) ? next.scene : "none";
     if (current !== this.loaded && this.now.online) this.loadScene();

@@ -37,6 +37,7 @@ export class VolumeView {
     const options = { alpha: true, premultipliedAlpha: true, antialias: false, depth: false, preserveDrawingBuffer: true };
     const gl = (this.gl = this.canvas.getContext("webgl2", options));
     if (!gl) throw new Error("This browser has no WebGL2, which the 3D view needs.");
+    this.fence = null;
     this.rays = new Program(gl, SCREEN_VERTEX, RAY_FRAGMENT);
     this.lines = new Program(gl, LINE_VERTEX, LINE_FRAGMENT);
     this.bare = gl.createVertexArray();
