@@ -45,7 +45,10 @@ test: test-rust test-python
 test-rust:
 	cargo test --quiet
 
+# The tests of the app draw in a real browser, and are skipped where there is none: this installs it where it may.
 test-python: $(BUILT)
+	@command -v chromium >/dev/null || [ "$$(id -u)" != 0 ] || { apt-get update -qq; \
+		DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends chromium; } >/dev/null || true
 	$(BIN)/pytest --quiet
 
 demo: $(BUILT)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -151,11 +152,13 @@ def train(
 @app.command()
 def evaluate(
     part: Annotated[
-        str, typer.Argument(help="What to measure: accuracy, convergence, robustness, cost, drawings, failures.")
+        str,
+        typer.Argument(help="What to measure: accuracy, convergence, robustness, cost, drawings, failures, advice."),
     ] = "accuracy",
     model: Model = None,
     shapes: Annotated[
-        int | None, typer.Option(help="The first so many shapes (all 500; convergence 100, robustness 50, cost 25).")
+        int | None,
+        typer.Option(help="The first so many shapes (all 500; convergence and advice 100, robustness 50, cost 25)."),
     ] = None,
     drawings: Annotated[
         list[Path] | None, typer.Option("--drawings", help="Folders of people's drawings, for the part drawings.")
@@ -169,7 +172,8 @@ def evaluate(
 
     accuracy: IoU by views and rounds, concavities, carving, ceiling, viewpoint. convergence: ten rounds, and orders of
     the drawings. robustness: faulty drawings. cost: time and memory. drawings: outlines of people's drawings, pieces,
-    and pictures from four sides. failures: the shapes that come out worst, with a picture.
+    and pictures from four sides. failures: the shapes that come out worst, with a picture. advice: what the second
+    viewpoint that the app advises brings.
     """
     with _errors():
         from sketchcore.evaluate.parts import PARTS, measure_part, write_part
@@ -236,6 +240,28 @@ def bench(
         typer.echo(json.dumps(report.to_dict() | {"growth": [asdict(curve) for curve in curves]}))
     else:
         _console.print(table(report))
+
+
+@app.command("app")
+def serve_app(
+    host: Annotated[str, typer.Option(help="Where to listen; 127.0.0.1 is this machine alone.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="TCP port.", min=1, max=65535)] = 8020,
+    sessions: Annotated[
+        Path | None, typer.Option(help="Folder of the sessions, instead of the one among the user's data.")
+    ] = None,
+    model: Model = None,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+) -> None:
+    """Draw in the browser: an object from a few sides, and its shape beside it.
+
+    The page is served from this machine. It comes with pip install 'sketchcore[app]'.
+    """
+    with _errors():
+        if find_spec("nicegui") is None:
+            raise ValueError("the app needs NiceGUI; install it by: pip install 'sketchcore[app]'")
+        from sketchcore.app.launch import launch
+
+        launch(host, port, sessions, model, show=browser)
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from rich.table import Table
 from sketchcore.atomic import replacing
 from sketchcore.evaluate import present
 from sketchcore.evaluate.accuracy import measure_accuracy
+from sketchcore.evaluate.advice import measure_advice
 from sketchcore.evaluate.convergence import measure_convergence
 from sketchcore.evaluate.cost import cost_as_table, measure_cost
 from sketchcore.evaluate.drawings import measure_drawings
@@ -49,6 +50,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
         "cost": Part(measure_cost, cost_as_table, takes=("shapes", "weights")),
         "drawings": Part(measure_drawings, present.drawings_table, takes=("folders", "out")),
         "failures": Part(measure_failures, present.failures_table, takes=("shapes", "out")),
+        "advice": Part(measure_advice, present.advice_table),
     }
 )
 

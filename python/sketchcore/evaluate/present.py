@@ -5,6 +5,7 @@ from __future__ import annotations
 from rich.table import Table
 
 from sketchcore.evaluate.accuracy import ROUNDS, Accuracy
+from sketchcore.evaluate.advice import LOTS, Advice
 from sketchcore.evaluate.comparison import Comparison
 from sketchcore.evaluate.convergence import MANY_ROUNDS, Convergence
 from sketchcore.evaluate.distort import STRENGTHS
@@ -84,6 +85,17 @@ def failures_table(report: Failures) -> Table:
     table = _table(f"Worst of the first {report.shapes} shapes of the fixed test set, one drawing", "IoU")
     for failure in report.worst:
         table.add_row(f"shape {failure.shape}", f"{failure.iou:.3f}")
+    return table
+
+
+def advice_table(report: Advice) -> Table:
+    """IoU with a second drawing from the advised viewpoint and from one drawn by lot."""
+    table = _table(f"Second viewpoint, on the first {report.shapes} shapes of the fixed test set", "IoU")
+    table.add_row("one drawing", str(report.one))
+    table.add_row("and one from the advised viewpoint", str(report.advised))
+    table.add_row(f"and one drawn by lot, mean of {LOTS}", str(report.random))
+    table.add_row("advised less drawn by lot", str(report.gain))
+    table.caption = f"the advised viewpoint is at least as good as {report.better:.0%} of those drawn by lot"
     return table
 
 

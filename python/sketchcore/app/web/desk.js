@@ -1,0 +1,240 @@
+// What the page knows of a session, and everything that can be done to it. Reactive: the panels show what is in here.
+
+import { reactive } from "vue";
+import { Outbox, Refused, listen, request, volume } from "./link.js";
+
+const FOLLOW = 1100; // milliseconds after the last change of a drawing until the shape follows
+const AGAIN = 1500; // milliseconds until a volume that could not be had is asked for again
+const CHECK = 700; // milliseconds after the last stroke until the composition is looked at
+
+const EMPTY = {
+  id: null,
+  name: "",
+  revision: -1,
+  part: null,
+  sheets: [],
+  parts: [],
+  solid: null,
+  scene: null,
+  stale: false,
+  can_undo: false,
+  can_redo: false,
+  progress: { round: 0, rounds: 0, working: false, waiting: false },
+  trouble: "",
+};
+
+export class Desk {
+  /** @param heard {drawing(), volume(bytes or null), unsure(bytes), say(text, kind)}; quarters: names of three-quarter views. */
+  constructor(quarters, heard) {
+    this.quarters = quarters;
+    this.heard = heard;
+    this.now = reactive({
+      state: structuredClone(EMPTY),
+      online: true,
+      waiting: 0, // changes that have not arrived yet
+      hints: [],
+      advice: null,
+      doubt: false,
+      viewpoint: null, // that one draws from; null while navigating
+      shownAt: 0, // when a volume was last put on the screen
+    });
+    this.included = new Set(); // viewpoints whose drawings the solid was made from
+  }
+
+  get state() {
+    return this.now.state;
+  }
+
+  // Sessions
+
+  async open(id) {
+    this.close();
+    const state = await request("GET", `/s/${id}`);
+    this.now.state = state;
+    this.loaded = null;
+    this.included = new Set(state.stale ? [] : this.inked);
+    Object.assign(this.now, { hints: [], advice: null, online: true });
+    this.outbox = new Outbox(id, {
+      state: (next) => this.take(next),
+      online: (online) => this.reach(online),
+      refused: (error) => this.refuse(error),
+    });
+    this.now.waiting = this.outbox.operations.length;
+    this.source = listen(id, { event: (event) => this.hear(event), online: (online) => this.reach(online) });
+    this.heard.drawing();
+    this.loadScene();
+    if (state.solid) this.advise();
+  }
+
+  async create() {
+    const { id } = await request("POST", "/sessions");
+    await this.open(id);
+    return id;
+  }
+
+  close() {
+    this.outbox?.close();
+    this.source?.close();
+    clearTimeout(this.following);
+    clearTimeout(this.checking);
+  }
+
+  // Changes
+
+  do(path, body = {}) {
+    if (!this.outbox) return;
+    this.outbox.push(path, body);
+    this.now.waiting = this.outbox.operations.length;
+    if (path === "strokes" || path === "erase") this.heard.drawing();
+  }
+
+  reconstruct() {
+    clearTimeout(this.following);
+    this.asked = performance.now();
+    this.do("reconstruct");
+  }
+
+  async photo(file, viewpoint) {
+    const state = await request("POST", `/s/${this.state.id}/photo?viewpoint=${viewpoint}`, file);
+    this.take(state);
+    return state.viewpoint;
+  }
+
+  // What comes back
+
+  take(state) {
+    if (state.id !== this.state.id) return;
+    this.now.waiting = this.outbox.operations.length;
+    if (state.revision < this.state.revision && this.now.online && !this.restarted) return;
+    this.restarted = false;
+    const before = this.state;
+    this.now.state = state;
+    if (!state.stale) this.included = new Set(this.inked);
+    this.heard.drawing();
+    this.loadScene();
+    if (JSON.stringify(state.sheets) !== JSON.stringify(before.sheets)) {
+      this.follow();
+      this.check();
+    }
+    this.finish(before, state);
+  }
+
+  hear(event) {
+    const before = { ...this.state };
+    const { revision, solid, scene, stale, trouble, ...progress } = event;
+    if (revision < before.revision) this.restarted = true;
+    const known = revision === before.revision;
+    Object.assign(this.state, { scene, solid, trouble, progress });
+    this.loadScene();
+    if (!known && !this.outbox.operations.length) this.refresh();
+    else if (known) this.state.stale = stale;
+    this.finish(before, this.state);
+  }
+
+  // Something else changed the session: a round of the reconstruction, another page.
+  refresh() {
+    if (this.refreshing) return;
+    this.refreshing = setTimeout(async () => {
+      try {
+        const state = await request("GET", `/s/${this.state.id}`);
+        this.refreshing = null;
+        this.restarted = true;
+        this.take(state);
+      } catch {
+        this.refreshing = null;
+      }
+    }, 60);
+  }
+
+  finish(before, state) {
+    if (state.trouble && state.trouble !== before.trouble) this.heard.say(state.trouble, "trouble");
+    if (before.progress.working && !state.progress.working && state.solid) this.advise();
+    if (!state.solid) this.now.advice = null;
+  }
+
+  refuse(error) {
+    this.now.waiting = this.outbox.operations.length;
+    this.heard.say(error.message, "trouble");
+    this.restarted = true;
+    this.refresh();
+  }
+
+  reach(online) {
+    if (online && !this.now.online) this.refresh();
+    this.now.online = online;
+  }
+
+  // The solid
+
+  async loadScene() {
+    const { state } = this;
+    const wanted = state.solid || state.parts.some((part) => part.visible) ? state.scene : "none";
+    if (wanted === this.loaded || this.loading) return;
+    this.loading = true;
+    try {
+      const bytes = wanted === "none" ? null : await volume(state.id, `scene?of=${wanted}`);
+      this.loaded = wanted;
+      this.heard.volume(bytes);
+      this.now.shownAt = performance.now();
+      if (bytes && this.now.doubt) this.heard.unsure(await volume(state.id, `unsure?of=${wanted}`));
+    } catch (error) {
+      if (error instanceof Refused) this.loaded = wanted;
+      else setTimeout(() => this.loadScene(), AGAIN);
+    }
+    this.loading = false;
+    if (this.loaded !== wanted) return;
+    const { state: next } = this;
+    const current = next.solid || next.parts.some((part) => part.visible) ? next.scene : "none";
+    if (current !== this.loaded && this.now.online) this.loadScene();
+  }
+
+  async doubt(on) {
+    this.now.doubt = on;
+    if (on && this.loaded && this.loaded !== "none")
+      this.heard.unsure(await volume(this.state.id, `unsure?of=${this.loaded}`));
+  }
+
+  async advise() {
+    try {
+      this.now.advice = await request("GET", `/s/${this.state.id}/advice`);
+    } catch {
+      this.now.advice = null;
+    }
+  }
+
+  // Of drawings that are in the shape already a change is followed by itself; a new one is waited for.
+  follow() {
+    clearTimeout(this.following);
+    const { state } = this;
+    if (!state.stale || !state.solid || !this.inked.every((name) => this.included.has(name))) return;
+    this.following = setTimeout(() => this.state.stale && this.reconstruct(), FOLLOW);
+  }
+
+  check() {
+    clearTimeout(this.checking);
+    const { viewpoint } = this.now;
+    if (!viewpoint) return;
+    this.checking = setTimeout(async () => {
+      try {
+        this.now.hints = await request("GET", `/s/${this.state.id}/hints/${viewpoint}`);
+      } catch {
+        this.now.hints = [];
+      }
+    }, CHECK);
+  }
+
+  // Questions
+
+  get inked() {
+    return this.state.sheets.filter((sheet) => sheet.ink).map((sheet) => sheet.viewpoint);
+  }
+
+  sheet(viewpoint) {
+    return this.state.sheets.find((sheet) => sheet.viewpoint === viewpoint)?.strokes ?? [];
+  }
+
+  /** Viewpoints that one may draw from: three-quarter ones first. */
+  allowed(all) {
+    return this.inked.some((name) => this.quarters.includes(name)) ? all : this.quarters;
+  }
+}
