@@ -87,6 +87,9 @@ class Carver:
             hull = sk.carve(sketches.drawings, cameras).astype(np.float32)
             yield hull * np.float32(0.6 if len(sketches) == 1 else 1)
 
+    def in_place(self, sketches: Sketches, always: bool = False) -> Sketches:
+        return sketches
+
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         yield from self.first_predictions([sketches])
 

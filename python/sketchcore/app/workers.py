@@ -6,6 +6,7 @@ import logging
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Protocol
 
 from sketchcore.app.order import Order, Progress
@@ -52,7 +53,7 @@ class Workers:
             model: as for `sketchcore.reconstruct`.
             threads: how many sessions are served at a time, 1 or more; each uses all processors as it can.
             changed: called from a worker's thread whenever a session's solid or progress changed.
-            reconstruct: None for `sketchcore.reconstruct`.
+            reconstruct: None for `sketchcore.reconstruct`, which leaves every drawing where it is.
 
         Raises:
             ValueError: for fewer than one thread.
@@ -156,7 +157,7 @@ class Workers:
                 import sketchcore as sk
 
                 self._model = sk.load_model(self._model)
-                self._reconstruct = sk.reconstruct
+                self._reconstruct = partial(sk.reconstruct, align=False)  # the solid lies under what was drawn
 
     def _run(self, session: Session, order: Order) -> None:
         self._load()
