@@ -18,7 +18,7 @@ from sketchcore.nets.inference import CompactInference, flip_cells, whole
 from sketchcore.nets.multiscale import MultiscaleNet
 from sketchcore.nets.outlines import heed_outlines
 from sketchcore.nets.pieces import join_pieces
-from sketchcore.nets.placement import in_place, out_of_place
+from sketchcore.nets.placement import in_place
 from sketchcore.nets.precision import autocast, pick_device, place, unit
 from sketchcore.nets.singleview import SingleViewModel
 from sketchcore.nets.sketches import Sketches
@@ -86,9 +86,7 @@ class CompactModel:
                 yield whole(cells[None])
 
     def in_place(self, sketches: Sketches, always: bool = False) -> Sketches:
-        first = whole(self._look(sketches)[2])
-        wanted = always or out_of_place(first, sketches)
-        return in_place(self.first_predictions, sketches, first) if wanted else sketches
+        return in_place(self.first_predictions, sketches, whole(self._look(sketches)[2]), always)
 
     def _look(self, sketches: Sketches) -> tuple[Tensor, Tensor, Tensor]:
         """The evidence of drawings, what is read in them, and what it says by itself."""

@@ -33,9 +33,9 @@ _FILLED, _SIZE, _X, _Y = 0.61, 0.36, 1.4, 2.2
 box's middle from the origin along x and y. Fitted to tell right places from wrong ones (docs/training.md)."""
 _DOUBT = 0.045
 """The likelihood of a place grows by e for so much more of the sum."""
-_OFF, _POOR = 0.03, 0.86
+_OFF, _POOR = 0.035, 0.8
 """A drawing whose solid is off by less, in size or place, and fills more of its outline, is not plainly out of place.
-Of exact drawings, about one in ten is off by more."""
+Of exact drawings, about one in twelve is."""
 _GAIN = 0.03
 """How much better a place must be than the one where the drawing is."""
 
@@ -76,23 +76,29 @@ class Placement:
         return (np.asarray(moved, np.float32) * np.float32(max(inverse, 1.0))).clip(0, 255).astype(np.uint8)
 
 
-def in_place(predict: Predict, sketches: Sketches, first: Volume) -> Sketches:
+def in_place(predict: Predict, sketches: Sketches, first: Volume, always: bool = False) -> Sketches:
     """The drawings moved to where they belong, as far as they are elsewhere and it can be told.
 
-    For each of them some forty places are tried.
+    For each of them some forty places are tried, if it is plainly out of place by itself.
 
     Args:
         predict: what the network first predicts.
         sketches: the drawings of one object.
         first: float32 [64, 64, 64], that of these drawings.
+        always: try the places of each of them, out of place or not.
 
     Returns:
         the drawings; the very same object if none is moved.
     """
+    if not always and not out_of_place(first, sketches):
+        return sketches
     cameras = [Camera.from_packed(row) for row in sketches.cameras]
     alone = [Sketches(sketches.drawings[i : i + 1], sketches.cameras[i : i + 1]) for i in range(len(sketches))]
     firsts = [first] if len(alone) == 1 else predict(alone)
-    found = [_search(predict, *each) for each in zip(alone, cameras, firsts, strict=True)]
+    found = [
+        _search(predict, one, camera, volume) if always or out_of_place(volume, one) else Placement()
+        for one, camera, volume in zip(alone, cameras, firsts, strict=True)
+    ]
     if all(place == Placement() for place in found):
         return sketches
     drawings = zip(found, sketches.drawings, cameras, strict=True)
