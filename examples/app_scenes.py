@@ -92,7 +92,7 @@ MUG = Thing(
         Cylinder((0, 0.1, 0), (0.22, 0.3, 0.22), op="subtract"),
     ),
     ("quarter-322", "right", "top"),
-    Placement((0.2, 0.06, 0.1), 0.22, 1),
+    Placement((0.16, 0.088, 0.1), 0.3, 1),
 )
 BOOKS = Thing(
     "Books",
@@ -102,7 +102,7 @@ BOOKS = Thing(
         Cuboid((0.03, 0.15, 0), (0.26, 0.06, 0.2)),
     ),
     ("quarter-037", "right"),
-    Placement((-0.18, 0.08, -0.08), 0.32),
+    Placement((-0.18, 0.06, -0.08), 0.32),
 )
 ENGINE = Thing(
     "Engine",

@@ -49,7 +49,9 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     first, second = read_tour()
 
-    def shot(hand: Hand, name: str) -> None:
+    def shot(hand: Hand, name: str, away: bool = True) -> None:
+        if away:
+            hand.page.mouse.move(640, 798)
         finished(hand)
         hand.page.screenshot(path=folder / f"{name}.png")
         print(f"{name}.png", flush=True)
@@ -68,12 +70,14 @@ def main(folder: Path) -> None:
         with person(browser, server.url) as hand:
             hand.view(first["viewpoint"])
             hand.press("construction")
-            for a, b in (((-0.34, -0.36, 0.26), (0.34, -0.36, 0.26)), ((0.34, -0.36, 0.26), (0.34, -0.36, -0.26))):
-                hand.line(project(first["viewpoint"], a), project(first["viewpoint"], b))
+            for y, z in ((-0.36, 0.26), (0.3, 0), (0.04, 0.36)):  # long lines, to lay out the object
+                hand.line(project(first["viewpoint"], (-0.46, y, z)), project(first["viewpoint"], (0.46, y, z)))
+            for x, y in ((0.34, -0.36), (-0.34, -0.36), (0.4, 0.04), (-0.4, 0.04)):
+                hand.line(project(first["viewpoint"], (x, y, 0.46)), project(first["viewpoint"], (x, y, -0.46)))
             hand.press("pen")
             draw(hand, first["strokes"][:10])
             hand.page.mouse.move(*hand.at(*project(first["viewpoint"], (0.34, 0.04, 0.26))))
-            shot(hand, "drawing")
+            shot(hand, "drawing", away=False)
             draw(hand, first["strokes"][10:])
             hand.page.mouse.move(2, 400)
             hand.reconstruct()
@@ -89,7 +93,7 @@ def main(folder: Path) -> None:
             hand.view(second["viewpoint"])
             draw(hand, second["strokes"][:9])
             hand.page.mouse.move(*hand.at(180, 120))
-            shot(hand, "second")
+            shot(hand, "second", away=False)
             draw(hand, second["strokes"][9:])
             hand.reconstruct()
             hand.press("navigate")
@@ -103,7 +107,7 @@ def main(folder: Path) -> None:
             hand.line((70, 110), (95, 110))
             hand.page.mouse.move(*hand.at(120, 128))
             hand.saved()
-            shot(hand, "ellipse")
+            shot(hand, "ellipse", away=False)
             hand.press("pen")
             hand.page.keyboard.press("?")
             shot(hand, "help")
@@ -135,7 +139,9 @@ def main(folder: Path) -> None:
                     hand.press("theme")
 
         with person(browser, server.url, viewport={"width": 430, "height": 860}, has_touch=True) as hand:
-            hand.view(first["viewpoint"]) if hand.page.locator(".panel").is_visible() else None
+            hand.press("panel")
+            hand.view(first["viewpoint"])
+            hand.press("panel")
             draw(hand, first["strokes"])
             hand.reconstruct()
             shot(hand, "phone")

@@ -122,7 +122,8 @@ def test_construction_lines_are_never_sent_to_the_networks(server, boxed):
     assert (drawing(state, FIRST) == lines).all()
     red = boxed.page.evaluate("""() => {
         const canvas = document.querySelector('canvas.ink'), k = canvas.width / 256;
-        return Array.from(canvas.getContext('2d').getImageData(Math.round(60 * k) - 6, Math.round(61.5 * k) - 6, 12, 12).data);
+        const [x, y] = [60, 61.5].map((at) => Math.round(at * k) - 6);
+        return Array.from(canvas.getContext('2d').getImageData(x, y, 12, 12).data);
     }""")
     pixels = np.array(red).reshape(-1, 4)
     reddest = pixels[pixels[:, 3].argmax()]

@@ -81,9 +81,10 @@ def test_a_small_drawing_gets_a_friendly_hint(hand):
 
 def test_everything_has_a_name_and_keys_do_what_they_say(boxed):
     page = boxed.page
-    unnamed = page.evaluate("""() => [...document.querySelectorAll('.workspace button, .workspace input')].filter((element) =>
-        !(element.getAttribute('aria-label') || element.textContent.trim() || element.closest('label')?.textContent.trim()
-          || element.getAttribute('aria-hidden'))).map((element) => element.outerHTML)""")
+    unnamed = page.evaluate("""() => [...document.querySelectorAll('.workspace button, .workspace input')]
+        .filter((element) => !(element.getAttribute('aria-label') || element.getAttribute('aria-hidden')
+            || element.textContent.trim() || element.closest('label')?.textContent.trim()))
+        .map((element) => element.outerHTML)""")
     assert unnamed == []
     page.keyboard.press("?")
     assert page.locator("dialog[aria-label='How it works']").is_visible()
@@ -99,8 +100,9 @@ def test_everything_has_a_name_and_keys_do_what_they_say(boxed):
     assert page.evaluate(f"{STAGE}.place.azimuth") == pytest.approx(azimuth + 5)
     page.keyboard.press("d")
     page.wait_for_function(f"{STAGE}.mode === 'draw'")
-    first = page.evaluate("""() => [...document.querySelectorAll('.workspace button, .workspace input, .stage')].filter((element) => element.tabIndex >= 0 && element.offsetParent).map((element) =>
-            element.closest('.topbar') ? 'bar' : element.closest('.stage') ? 'stage' : 'panel')""")
+    first = page.evaluate("""() => [...document.querySelectorAll('.workspace button, .workspace input, .stage')]
+        .filter((element) => element.tabIndex >= 0 && element.offsetParent)
+        .map((element) => element.closest('.topbar') ? 'bar' : element.closest('.stage') ? 'stage' : 'panel')""")
     assert first == sorted(first, key=["bar", "stage", "panel"].index)  # the focus goes bar, stage, panel
 
 

@@ -22,12 +22,14 @@ import httpx
 import uvicorn
 from fastapi import FastAPI
 from hand import FIRST, HIGH, LOW, box_edges
+from typer.testing import CliRunner
 
 from sketchcore.app.events import Hub
 from sketchcore.app.guard import Guard
 from sketchcore.app.launch import is_local, sessions_folder
 from sketchcore.app.server import MAX_CHANGE, Server, build_router
 from sketchcore.app.store import Store
+from sketchcore.cli import app as command_line
 
 BALL = np.linalg.norm(np.indices((64, 64, 64)) / 63 - 0.5, axis=0) < 0.3
 
@@ -233,6 +235,13 @@ def test_sessions_are_kept_among_the_users_data(monkeypatch, tmp_path):
     monkeypatch.delenv("XDG_DATA_HOME")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     assert sessions_folder() == tmp_path / "home" / ".local" / "share" / "sketchcore" / "sessions"
+
+
+def test_without_nicegui_the_command_says_what_to_install(monkeypatch):
+    monkeypatch.setattr("sketchcore.cli.find_spec", lambda name: None)
+    result = CliRunner().invoke(command_line, ["app", "--no-browser"])
+    assert result.exit_code == 1
+    assert "pip install 'sketchcore[app]'" in result.output
 
 
 def test_those_who_listen_hear_the_newest_state(server):

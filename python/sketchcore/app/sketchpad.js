@@ -247,7 +247,7 @@ export default {
       this.references = [];
       this.show();
       if (!viewpoint) return;
-      this.desk.check();
+      this.desk.check(700);
       if (!this.now.state.parts.length) return;
       request("GET", `/s/${this.desk.state.id}/reference/${viewpoint}`)
         .then((strokes) => {

@@ -5,7 +5,7 @@ import { Outbox, Refused, listen, request, volume } from "./link.js";
 
 const FOLLOW = 1100; // milliseconds after the last change of a drawing until the shape follows
 const AGAIN = 1500; // milliseconds until a volume that could not be had is asked for again
-const CHECK = 700; // milliseconds after the last stroke until the composition is looked at
+const CHECK = 3000; // milliseconds after the last stroke until the composition is looked at: not while one draws
 
 const EMPTY = {
   id: null,
@@ -48,8 +48,12 @@ export class Desk {
   // Sessions
 
   async open(id) {
-    this.close();
     const state = await request("GET", `/s/${id}`);
+    this.close();
+    const { state: left } = this;
+    // One that nothing was ever done in would only lengthen the list.
+    if (left.id && left.id !== id && left.revision === 0 && !this.now.waiting)
+      request("DELETE", `/s/${left.id}`).catch(() => null);
     this.now.state = state;
     this.loaded = null;
     this.included = new Set(state.stale ? [] : this.inked);
@@ -90,8 +94,8 @@ export class Desk {
 
   reconstruct() {
     clearTimeout(this.following);
-    this.asked = performance.now();
     this.do("reconstruct");
+    this.check(0);
   }
 
   async photo(file, viewpoint) {
@@ -210,7 +214,7 @@ export class Desk {
     this.following = setTimeout(() => this.state.stale && this.reconstruct(), FOLLOW);
   }
 
-  check() {
+  check(soon = CHECK) {
     clearTimeout(this.checking);
     const { viewpoint } = this.now;
     if (!viewpoint) return;
@@ -220,7 +224,7 @@ export class Desk {
       } catch {
         this.now.hints = [];
       }
-    }, CHECK);
+    }, soon);
   }
 
   // Questions

@@ -22,7 +22,7 @@ export const Help = {
   props: ["actions"],
   emits: ["close", "tour"],
   template: `
-    <sheet title="How it works" wide @close="$emit('close')">
+    <sheet title="How it works" :wide="true" @close="$emit('close')">
       <ol class="steps">
         <li><b>Draw</b> the lines of an object inside the cube, from a corner view. Blue lines through the pen show where edges vanish;
           hold <kbd>Shift</kbd> for a straight line along them.</li>

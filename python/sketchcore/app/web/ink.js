@@ -70,7 +70,7 @@ export class Paper {
     context.globalAlpha = faint * (kind === "construction" ? 0.75 : 1);
     context.strokeStyle = context.fillStyle = this.colours[kind];
     context.lineCap = context.lineJoin = "round";
-    const thin = kind === "construction" ? 0.55 : 0.85; // slightly thinner than the networks' pixels, for the eye
+    const thin = kind === "construction" ? 0.55 : 0.75; // slightly thinner than the networks' pixels, for the eye
     const width = (pressure) => (WIDTH[0] + (WIDTH[1] - WIDTH[0]) * pressure) * thin;
     if (points.length === 1 || from === 0) {
       const [x, y, pressure] = points[0];

@@ -32,8 +32,8 @@ const Views = {
   template: `
     <div class="views" role="radiogroup" aria-label="Viewpoint to draw from" @keydown="arrow">
       <svg viewBox="-100 -100 200 200" aria-hidden="true">
-        <circle r="80" /><circle r="46" class="inner" /><rect x="-15" y="-15" width="30" height="30" rx="3" />
-        <text y="97">front</text>
+        <circle r="86" /><circle r="48" class="inner" /><rect x="-15" y="-15" width="30" height="30" rx="3" />
+        <text y="74">front</text>
       </svg>
       <button v-for="view in places" :key="view.name" type="button" role="radio" :data-view="view.name"
               :aria-checked="String(view.name === current)" :disabled="!allowed.includes(view.name)"
@@ -47,7 +47,7 @@ const Views = {
       return Object.entries(this.viewpoints).map(([name, row]) => {
         const { azimuth } = placeOf(unpack(row));
         const quarter = name.startsWith("quarter");
-        const radius = quarter ? 40 : name === "top" ? 0 : 23;
+        const radius = quarter ? 43 : name === "top" ? 0 : 24;
         const angle = (azimuth * Math.PI) / 180; // the front, +x, points down; its right, +z, is at the left
         return { name, quarter, x: 50 - radius * Math.sin(angle), y: 50 + radius * Math.cos(angle) };
       });

@@ -34,6 +34,8 @@ const float CELL = 1.0 / 64.0;
 
 float at(vec3 p) { return texture(volume, p.zyx + 0.5).r; }
 
+float query(vec3 p) { return texture(unsure, p.zyx + 0.5).r; }
+
 float soft(vec3 p) { return texture(volume, p.zyx + 0.5).g; }
 
 vec3 gradient(vec3 p) {
@@ -125,7 +127,13 @@ void main() {
     light *= 1.0 - 0.16 * closed;
   }
   vec3 base = clay;
-  if (doubt > 0.5) base = mix(base, alarm, smoothstep(0.05, 0.75, texture(unsure, p.zyx + 0.5).r));
+  if (doubt > 0.5) {
+    // The surface itself lies at one half everywhere: what tells is how far around it the probability stays near that.
+    vec3 d = normal * CELL;
+    float wide = 0.0;
+    for (float k = 1.5; k < 4.0; k += 1.0) wide += query(p + k * d) + query(p - k * d);
+    base = mix(base, alarm, smoothstep(0.15, 0.7, wide / 6.0));
+  }
   float rim = pow(1.0 - max(dot(normal, toward), 0.0), 4.0);
   vec3 seen = base * light + 0.08 * rim;
   float alpha = opacity * cover;

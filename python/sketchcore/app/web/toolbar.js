@@ -48,6 +48,7 @@ export const TopBar = {
       </div>
       <div class="modes" role="radiogroup" aria-label="Mode">
         <button v-for="name in ['draw', 'navigate']" :key="name" type="button" role="radio" :data-action="name"
+                :aria-label="name === 'draw' ? 'Draw' : 'Navigate'" :aria-keyshortcuts="actions[name].keys[0]"
                 :aria-checked="String(ui.mode === name)" :class="{ pressed: ui.mode === name }"
                 :data-tip="actions[name].label + '  ' + key(actions[name])" @click="run(name)">
           <i class="material-symbols-outlined" aria-hidden="true">{{ actions[name].icon }}</i>
@@ -58,7 +59,7 @@ export const TopBar = {
         <tool :action="actions.undo" :disabled="!now.state.can_undo && !now.waiting" @run="run" />
         <tool :action="actions.redo" :disabled="!now.state.can_redo" @run="run" />
         <button type="button" class="primary" data-action="reconstruct" :disabled="!ready" :class="{ busy, stale: now.state.stale }"
-                :aria-busy="String(busy)" :data-tip="actions.reconstruct.label + '  ' + key(actions.reconstruct)" @click="run('reconstruct')">
+                :aria-busy="String(busy)" :aria-label="text" aria-keyshortcuts="Enter" :data-tip="actions.reconstruct.label + '  ' + key(actions.reconstruct)" @click="run('reconstruct')">
           <span class="fill" :style="{ transform: 'scaleX(' + share + ')' }" aria-hidden="true"></span>
           <i class="material-symbols-outlined" aria-hidden="true">deployed_code</i>
           <span class="text">{{ text }}</span>

@@ -114,7 +114,10 @@ export class VolumeView {
     } else if (!this.finer && this.last.scale === ratio && !this.last.moving) {
       const finer = Math.min(2, Math.sqrt(PATIENT / Math.max(this.last.milliseconds, 1)));
       this.finer = true;
-      if (finer > 1.2) this.draw(state, ratio * finer, false);
+      if (finer > 1.2) {
+        this.draw(state, ratio * finer, false);
+        this.schedule();
+      }
     }
   }
 
