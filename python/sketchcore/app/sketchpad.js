@@ -334,7 +334,7 @@ export default {
       this.dismiss();
       const own = this.desk.state.id;
       const drawings = await (await fetch(this.example)).json();
-      await this.desk.create();
+      await this.desk.create(true);
       const mine = this.desk.state.id;
       Object.assign(this.ui, { tool: "pen", kind: "ink" });
       Object.assign(this.stage, { tool: "pen", kind: "ink" });

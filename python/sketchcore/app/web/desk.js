@@ -47,12 +47,12 @@ export class Desk {
 
   // Sessions
 
-  async open(id) {
+  /** Goes to a session; the one that is left is deleted if nothing was ever done in it, but for `keep`. */
+  async open(id, keep = false) {
     const state = await request("GET", `/s/${id}`);
     this.close();
     const { state: left } = this;
-    // One that nothing was ever done in would only lengthen the list.
-    if (left.id && left.id !== id && left.revision === 0 && !this.now.waiting)
+    if (!keep && left.id && left.id !== id && left.revision === 0 && !this.now.waiting)
       request("DELETE", `/s/${left.id}`).catch(() => null);
     this.now.state = state;
     this.loaded = null;
@@ -70,9 +70,9 @@ export class Desk {
     if (state.solid) this.advise();
   }
 
-  async create() {
+  async create(keep = false) {
     const { id } = await request("POST", "/sessions");
-    await this.open(id);
+    await this.open(id, keep);
     return id;
   }
 

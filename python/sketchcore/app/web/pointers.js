@@ -59,6 +59,7 @@ export class Pointers {
       this.note(event);
     } else if (before && this.stage.mode !== "draw") {
       const [dx, dy] = [event.clientX - before.x, event.clientY - before.y];
+      this.turning = true;
       if (this.down.size === 1) this.stage.turn(dx * TURN, dy * TURN);
       else this.pinch(event, dx, dy);
     }
@@ -78,6 +79,7 @@ export class Pointers {
 
   release(event, cancelled = false) {
     this.down.delete(event.pointerId);
+    if (!this.down.size) this.turning = false;
     if (!this.live || event.pointerId !== this.live.id) return;
     if (cancelled) return this.cancel();
     const live = this.live;

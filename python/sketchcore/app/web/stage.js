@@ -127,7 +127,7 @@ export class Stage {
       else moving = true;
     }
     const { x, y, side } = this.area;
-    return { camera: this.camera, centre: [x + side / 2, y + side / 2], side, moving };
+    return { camera: this.camera, centre: [x + side / 2, y + side / 2], side, moving, held: this.pointers?.turning ?? false };
   }
 
   setFaint(faint) {
@@ -211,7 +211,7 @@ export class Stage {
 
   hover(at, straightTo = null) {
     this.overlay.begin();
-    if (this.mode !== "draw" || !at) return;
+    if (this.mode !== "draw" || !at || Math.min(...at) < -4 || Math.max(...at) > IMAGE + 4) return;
     if (this.tool === "eraser") return this.overlay.ring(at, this.eraser);
     if (this.tool === "ellipse") {
       this.overlay.lines(this.camera, straightTo?.from ?? at, this.axis);

@@ -17,7 +17,8 @@ const EDGES = CORNERS.flatMap((_, i) => [1, 2, 4].filter((bit) => !(i & bit)).ma
 export class VolumeView {
   /**
    * @param canvas takes the whole stage; it is drawn into with alpha, over whatever lies behind it.
-   * @param frame called before each frame: {camera, centre, side, moving}: the drawing area in CSS pixels.
+   * @param frame called before each frame: {camera, centre, side, moving, held}: the drawing area in CSS pixels; whether
+   *   the camera moves by itself; whether someone has hold of it.
    */
   constructor(canvas, frame) {
     this.canvas = canvas;
@@ -101,7 +102,9 @@ export class VolumeView {
       this.settle();
     }
     const state = this.frame();
-    const moving = state.moving || performance.now() - (this.movedAt ?? -REST) < REST;
+    // Where frames are slow, so are the events between them: rest is what lasts longer than two of them.
+    const rest = Math.min(1000, Math.max(REST, 2 * this.last.milliseconds));
+    const moving = state.moving || state.held || performance.now() - (this.movedAt ?? -rest) < rest;
     const ratio = window.devicePixelRatio || 1;
     if (moving) {
       if (this.dirty || state.moving) this.draw(state, ratio * SCALES[this.level], true);
