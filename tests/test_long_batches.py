@@ -55,10 +55,12 @@ def child(code):
 
 
 INTERRUPTED = """
+import signal
 import time
 import numpy as np
 from sketchcore.datagen import generate
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs in the background ignores it
 seen = []
 def progress(finished):
     if not seen:
