@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from sketchcore.evaluate.testset import Example, count_shapes, load_testset
 from sketchcore.grids import carve, to_world_grid
 from sketchcore.nets.models import Model
 from sketchcore.nets.sketches import Sketches
-from sketchcore.rounds import TOLERANCE, until_settled
+from sketchcore.rounds import TOLERANCE, Volume, until_settled
 from sketchcore.viewpoint import guess_viewpoint, opposite
 from sketchcore.volume import iou
 
@@ -98,6 +98,13 @@ def measure_accuracy(
         seconds=seconds / total,
         each=last.tolist(),
     )
+
+
+def settled(model: Model, drawings: NDArray[np.uint8], cameras: Sequence[Camera]) -> Volume:
+    """The solid of drawings, uint8 [n, 256, 256], as `reconstruct` makes it: in their places, until it has settled."""
+    sketches = model.in_place(Sketches(drawings, pack_cameras(cameras)))
+    *_, volume = until_settled(model.rounds(sketches, ROUNDS))
+    return volume
 
 
 def predictions(

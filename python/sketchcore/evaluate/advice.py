@@ -9,15 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from sketchcore.app.advice import best_view
-from sketchcore.camera import VIEWPOINTS, pack_cameras
-from sketchcore.evaluate.accuracy import ROUNDS
+from sketchcore.camera import VIEWPOINTS
+from sketchcore.evaluate.accuracy import settled
 from sketchcore.evaluate.figure import Figure
 from sketchcore.evaluate.report import Report
 from sketchcore.evaluate.testset import Example, count_shapes, load_testset
 from sketchcore.grids import draw
 from sketchcore.nets.models import Model
-from sketchcore.nets.sketches import Sketches
-from sketchcore.rounds import Volume, until_settled
+from sketchcore.rounds import Volume
 from sketchcore.volume import iou
 
 LOTS = 2
@@ -95,6 +94,4 @@ def measure_advice(
 def _reconstruct(model: Model, example: Example, names: Sequence[str]) -> Volume:
     cameras = [VIEWPOINTS[name] for name in names]
     drawings = np.stack([draw(example.shape, camera) for camera in cameras])
-    sketches = model.in_place(Sketches(drawings, pack_cameras(cameras)))
-    *_, volume = until_settled(model.rounds(sketches, ROUNDS))
-    return volume
+    return settled(model, drawings, cameras)

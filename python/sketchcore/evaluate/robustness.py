@@ -7,15 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sketchcore.camera import pack_cameras
-from sketchcore.evaluate.accuracy import ROUNDS, VIEWS
+from sketchcore.evaluate.accuracy import VIEWS, settled
 from sketchcore.evaluate.distort import STRENGTHS, distorted
 from sketchcore.evaluate.figure import Figure
 from sketchcore.evaluate.report import Report
 from sketchcore.evaluate.testset import Example, count_shapes, load_testset
 from sketchcore.nets.models import Model
-from sketchcore.nets.sketches import Sketches
-from sketchcore.rounds import until_settled
 from sketchcore.volume import iou
 
 COUNTS = (1, VIEWS)
@@ -73,16 +70,10 @@ def measure_robustness(
 
 
 def _scores(model: Model, example: Example, faults: dict[str, int], seed: int) -> list[float]:
-    cameras = pack_cameras(example.cameras)
     drawings = np.stack(
         [
             distorted(example.shape, camera, faults, np.random.default_rng((seed, v)))
             for v, camera in enumerate(example.cameras)
         ]
     )
-    scores = []
-    for count in COUNTS:
-        sketches = model.in_place(Sketches(drawings[:count], cameras[:count]))
-        *_, volume = until_settled(model.rounds(sketches, ROUNDS))
-        scores.append(iou(volume, example.world))
-    return scores
+    return [iou(settled(model, drawings[:n], example.cameras[:n]), example.world) for n in COUNTS]
