@@ -1,5 +1,5 @@
 //! The paper's shape grammar (section 4.1): cuboids and cylinders grown onto each other, symmetric about z = 0;
-//! and wedges and bent sheets, which are ours, where a config asks for them.
+//! and wedges, cut edges, bores and bent sheets, which are ours, where a config asks for them.
 //!
 //! Only sums, products and comparisons of 64-bit floats are used, so a seed's shapes are bit-identical on every
 //! machine.
@@ -11,7 +11,9 @@ use crate::voxel::{BitGrid, CELLS, SIDE};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+mod bore;
 mod sheet;
+pub use bore::BoreConfig;
 pub use sheet::SheetConfig;
 
 /// Every amplitude and count of the grammar. Pairs are ranges that are drawn from evenly; sizes are relative to
@@ -34,6 +36,10 @@ pub struct GrammarConfig {
     /// How much of a side such a cut takes, at most one half; every second one takes that half, so that two of them meet in
     /// a ridge.
     pub chamfer: [f64; 2],
+    /// Share of the cuboids cut at all four edges that become a hexagonal or octagonal bar.
+    pub regular: f64,
+    /// Holes along the axis of an added cuboid or cylinder: a ring, a pipe, a cup; the paper has none.
+    pub bores: BoreConfig,
     /// Bent sheets to begin with; the paper has none.
     pub sheets: SheetConfig,
     /// Share of subtracted primitives.
@@ -73,6 +79,8 @@ impl Default for GrammarConfig {
             slab_thickness: [0.15, 0.5],
             chamfered: 0.0,
             chamfer: [0.1, 0.5],
+            regular: 0.0,
+            bores: BoreConfig::default(),
             sheets: SheetConfig::default(),
             subtracted: 0.33,
             first_half: [0.1, 0.4],
@@ -100,12 +108,22 @@ impl GrammarConfig {
         match self {
             c if !(1..=c.steps[1]).contains(&c.steps[0]) => bad("steps must be [least, most], from 1"),
             c if c.steps[1] > 500 => bad("steps must be at most 500"),
-            c if ![c.cylinders, c.wedges, c.slabs, c.chamfered, c.fitted, c.subtracted, c.displaced]
-                .into_iter()
-                .all(share) =>
+            c if ![
+                c.cylinders,
+                c.wedges,
+                c.slabs,
+                c.chamfered,
+                c.regular,
+                c.fitted,
+                c.subtracted,
+                c.displaced,
+            ]
+            .into_iter()
+            .all(share) =>
             {
                 bad(
-                    "cylinders, wedges, slabs, chamfered, fitted, subtracted and displaced are shares between 0 and 1",
+                    "cylinders, wedges, slabs, chamfered, regular, fitted, subtracted and displaced are shares between \
+                     0 and 1",
                 )
             }
             c if c.cylinders + c.wedges > 1.0 => bad("cylinders and wedges must be at most 1 together"),
@@ -125,7 +143,7 @@ impl GrammarConfig {
             c if !(0.0..1.0).contains(&c.min_occupancy) => bad("min_occupancy must lie in [0, 1)"),
             c if c.min_extent >= SIDE => bad("min_extent must be less than 64"),
             c if c.attempts == 0 => bad("attempts must be at least 1"),
-            c => c.sheets.check(),
+            c => c.bores.check().and_then(|()| c.sheets.check()),
         }
     }
 
@@ -149,7 +167,7 @@ impl GrammarConfig {
         } else {
             let first = self.primitive(self.first_half, true, random);
             push_symmetric(&mut shape, first);
-            self.cut_edges(&mut shape, first, random);
+            self.cut(&mut shape, first, random);
         }
         for _ in 1..steps {
             let additive = !random.chance(self.subtracted);
@@ -165,9 +183,17 @@ impl GrammarConfig {
                 let cut = (added + shape.len()) / 2;
                 shape[cut..].iter_mut().for_each(|wedge| *wedge = beyond_slab(*wedge, thickness));
             }
-            self.cut_edges(&mut shape, new, random);
+            self.cut(&mut shape, new, random);
         }
         shape
+    }
+
+    /// What is taken at once from a primitive that was just added: edges, and a bore.
+    fn cut(&self, shape: &mut Vec<Primitive>, on: Primitive, random: &mut Random) {
+        self.cut_edges(shape, on, random);
+        if let Some(bore) = self.bores.draw(on, random) {
+            push_symmetric(shape, bore);
+        }
     }
 
     /// Cuts off edges of some of the added cuboids, along one axis: on one side or on both, mostly in pairs.
@@ -179,7 +205,11 @@ impl GrammarConfig {
         let axis = random.below(3);
         let sides: &[i8] = [&[1, -1][..], &[1], &[-1]][random.below(3)];
         let ends: &[i8] = if random.chance(0.75) { &[1, -1] } else { &[1] };
-        let size = [(); 2].map(|()| if random.chance(0.5) { 0.5 } else { random.between(self.chamfer) });
+        let mut size = [(); 2].map(|()| if random.chance(0.5) { 0.5 } else { random.between(self.chamfer) });
+        let all_four = sides.len() == 2 && ends.len() == 2;
+        if all_four && self.regular > 0.0 && random.chance(self.regular) {
+            size = BARS[random.below(BARS.len())];
+        }
         for (&u, &v) in ends.iter().flat_map(|u| sides.iter().map(move |v| (u, v))) {
             let edge = edge_of(on, axis, [u, v], size);
             if !shape.contains(&edge) {
@@ -251,6 +281,10 @@ impl GrammarConfig {
     }
 }
 
+/// How much of each side goes where four cut edges leave a hexagon, standing on an edge or on a corner, or an octagon.
+const BARS: [[f64; 2]; 3] = [[0.5, 0.25], [0.25, 0.5], [1.0 - SQRT_HALF; 2]];
+const SQRT_HALF: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
 /// Adds a primitive, and its mirror image where that is another one.
 ///
 /// A wedge in the plane of symmetry that slopes across it becomes two of half its size, back to back: a gable or a
@@ -291,7 +325,15 @@ mod tests {
     #[test]
     fn shapes_are_symmetric_connected_and_scaled() {
         let paper = GrammarConfig::default();
-        let wedges = GrammarConfig { wedges: 0.3, slabs: 0.5, fitted: 0.4, chamfered: 0.5, ..paper.clone() };
+        let wedges = GrammarConfig {
+            wedges: 0.3,
+            slabs: 0.5,
+            fitted: 0.4,
+            chamfered: 0.5,
+            regular: 0.5,
+            bores: BoreConfig { share: 0.3, ..BoreConfig::default() },
+            ..paper.clone()
+        };
         for (config, sample) in (0..200).flat_map(|i| [(&paper, i), (&wedges, i)]) {
             let (shape, grid) = config.draw(&mut Random::new(7, sample, 0)).unwrap();
             assert!(grid.is_connected());
@@ -321,6 +363,8 @@ mod tests {
         assert!(with(|c| c.slabs = 2.0).contains("between 0 and 1"));
         assert!(with(|c| c.chamfer = [0.1, 0.6]).contains("at most 0.5"));
         assert!(with(|c| c.slab_thickness = [0.5, 1.0]).contains("slab_thickness"));
+        assert!(with(|c| c.regular = 1.5).contains("regular"));
+        assert!(with(|c| c.bores.share = 2.0).contains("bores.share"));
         assert!(with(|c| c.cover = f64::NAN).contains("cover"));
         let hopeless = GrammarConfig { min_occupancy: 0.9, attempts: 5, ..GrammarConfig::default() };
         let error = hopeless.draw(&mut Random::new(0, 0, 0)).unwrap_err();

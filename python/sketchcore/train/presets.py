@@ -100,9 +100,11 @@ COMPACT = Preset(
             "slabs": 0.3,
             "fitted": 0.5,
             "chamfered": 0.5,
+            "regular": 0.4,
+            "bores": {"share": 0.15},
             "sheets": {"share": 0.1},
         },
-        "free": {"share": 0.25},
+        "free": {"share": 0.25, "elevation": [0.0, 60.0]},
         "hand": {"share": 0.7},
     },
 )
