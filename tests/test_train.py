@@ -74,6 +74,36 @@ def test_a_finished_run_resumed_changes_no_weight(tmp_path: Path) -> None:
     assert all(torch.equal(before[k], after[k]) for k in before)
 
 
+def test_a_run_begins_with_the_weights_of_another(tmp_path: Path) -> None:
+    first, second = tmp_path / "first", tmp_path / "second"
+    train(tiny(first, steps=2), quiet=True)
+    weights, config = load_weights(first / "weights.safetensors")
+    begun = Run(second, steps=1, begin=first / "weights.safetensors", changes={"batch": 2, "rate": 1e-9, "muon": 1e-9})
+    [progress] = train(begun, quiet=True)
+    assert progress.step == 1 and progress.began == config
+    after, told = load_weights(second / "weights.safetensors")
+    assert told["options"] == config["options"]
+    assert told["training"]["runs"][0]["began"]["training"]["runs"][0]["step"] == 2
+    assert all(torch.allclose(after[name], weights[name], atol=2e-3) for name in weights)
+    [resumed] = train(Run(second, steps=2, changes={"batch": 2}), resume=True, quiet=True)
+    assert resumed.step == 2 and resumed.began == config, "a resumed run knows its options and its beginning"
+
+
+def test_weights_that_a_run_cannot_begin_with_are_refused(tmp_path: Path) -> None:
+    train(tiny(tmp_path / "a", steps=1), quiet=True)
+    weights = tmp_path / "a" / "weights.safetensors"
+    for preset in ("paper", "multiscale"):
+        with pytest.raises(ValueError, match="take a preset of that network"):
+            train(Run(tmp_path / "b", preset, steps=1, begin=weights), quiet=True)
+    with pytest.raises(ValueError, match="leave out the weights"):
+        train(Run(tmp_path / "a", steps=2, begin=weights), resume=True, quiet=True)
+    with pytest.raises(ValueError, match="not both"):
+        Run(tmp_path / "b", steps=1, begin=weights, options={"stem": 8})
+    with pytest.raises(FileNotFoundError, match="no weights"):
+        train(Run(tmp_path / "b", steps=1, begin=tmp_path / "none.safetensors"), quiet=True)
+    assert not (tmp_path / "b").exists()
+
+
 def test_the_paper_preset_trains_both_networks(tmp_path: Path) -> None:
     run = Run(tmp_path, "paper", steps=2, options={"width": 4}, changes={"batch": 2})
     single, updater = train(run, quiet=True)

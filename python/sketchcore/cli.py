@@ -127,6 +127,9 @@ def train(
     steps: Annotated[int | None, typer.Option(help="Steps for each network, over all runs.")] = None,
     seed: Annotated[int, typer.Option(help="Of samples and initial weights.")] = 0,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint in the folder.")] = False,
+    begin: Annotated[
+        Path | None, typer.Option("--from", help="Weights to begin with, of the preset's network; else random ones.")
+    ] = None,
     device: Annotated[str | None, typer.Option(help="cpu or cuda; the default is the best there is.")] = None,
     as_json: Json = False,
 ) -> None:
@@ -137,7 +140,7 @@ def train(
         from sketchcore.train import Run
         from sketchcore.train import train as run_training
 
-        run = Run(out, preset, minutes, steps, seed, device)
+        run = Run(out, preset, minutes, steps, seed, device, begin=begin)
         try:
             stages = run_training(run, resume=resume, quiet=as_json)
         except KeyboardInterrupt:

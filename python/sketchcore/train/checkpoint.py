@@ -27,6 +27,7 @@ class Progress:
         seconds: time spent.
         waited: of these, seconds that were spent waiting for samples.
         iou: latest held-out IoU, if it was measured.
+        began: the config of the weights that it began with, if any were given.
     """
 
     stage: str
@@ -35,6 +36,7 @@ class Progress:
     seconds: float = 0.0
     waited: float = 0.0
     iou: float | None = None
+    began: dict[str, Any] | None = None
 
     def speed(self) -> str:
         """Samples a second, and the share of the time that was spent waiting for them, in words."""

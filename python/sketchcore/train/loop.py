@@ -20,6 +20,7 @@ from sketchcore.nets.multiscale import MultiscaleNet
 from sketchcore.nets.precision import pick_device
 from sketchcore.nets.unet import PaperNet
 from sketchcore.nets.weights import save_weights
+from sketchcore.train.beginning import Beginning, read_beginning
 from sketchcore.train.chains import ChainStage
 from sketchcore.train.checkpoint import Checkpoint, Progress, load_checkpoint, save_checkpoint
 from sketchcore.train.optimizers import make_optimizers
@@ -73,6 +74,7 @@ class Run:
         evaluate_every: seconds between measurements of the held-out IoU.
         options: what differs from the network's default configuration; for tiny networks in tests.
         changes: what differs from the preset.
+        begin: weights to begin with instead of random ones; the options are theirs then.
     """
 
     out: Path
@@ -85,6 +87,7 @@ class Run:
     evaluate_every: float = 300.0
     options: dict[str, Any] | None = None
     changes: dict[str, Any] | None = None
+    begin: Path | None = None
 
     def __post_init__(self) -> None:
         if self.preset not in PRESETS:
@@ -98,6 +101,8 @@ class Run:
             raise ValueError("minutes or steps must be more than 0")
         if not 0 <= self.seed < 2**63:
             raise ValueError(f"seed must lie between 0 and 2^63 - 1, got {self.seed}")
+        if self.begin is not None and self.options is not None:
+            raise ValueError("say either the weights to begin with or the options of new ones, not both")
 
     @property
     def constants(self) -> Preset:
@@ -119,9 +124,12 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
     Raises:
         FileExistsError: if `run.out` holds checkpoints already, without `resume`.
         FileNotFoundError: with `resume`, if it holds none.
-        ValueError: for a run or a checkpoint that makes no sense.
+        ValueError: for a run, a checkpoint or weights to begin with that make no sense.
         FloatingPointError: if the loss is no longer finite; the last checkpoint stands.
     """
+    if resume and run.begin is not None:
+        raise ValueError("a resumed run goes on from its checkpoint; leave out the weights to begin with")
+    beginning = None if run.begin is None else read_beginning(run.begin, run.constants)
     run.out.mkdir(parents=True, exist_ok=True)
     stages = run.constants.stages
     checkpoints = {name: run.out / f"{name}.checkpoint.safetensors" for name in stages}
@@ -143,9 +151,12 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
             )
         # A later stage that has begun shows that this one is done.
         begun = any(checkpoints[later].exists() for later in stages[index + 1 :])
-        stage = _stage(run, name, device, found, trained)
+        progress = found.progress if found else Progress(name, began=beginning and beginning.record)
+        stage = _stage(run, progress, device, trained)
         try:
-            loop = _Loop(run, name, stage, found, checkpoints[name])
+            if beginning and name in beginning.states:
+                _fill(stage.model, beginning.states[name])
+            loop = _Loop(run, stage, found, progress, checkpoints[name])
             results.append(loop.progress if begun else loop.go(share=1 / len(stages), quiet=quiet))
         finally:
             stage.close()
@@ -154,12 +165,13 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
     return results
 
 
-def _stage(run: Run, name: str, device: torch.device, found: Checkpoint | None, trained: dict[str, Network]) -> Stage:
+def _stage(run: Run, progress: Progress, device: torch.device, trained: dict[str, Network]) -> Stage:
     torch.manual_seed(run.seed)
-    constants, options = run.constants, run.options or {}
-    samples = found.progress.samples if found else 0
+    name, samples = progress.stage, progress.samples
+    constants, options = run.constants, run.options or (progress.began or {}).get("options", {})
     if name == "compact":
-        return ChainStage(constants, run.seed, device, samples, CompactConfig(**options))
+        tuples = {k: tuple(v) if isinstance(v, list) else v for k, v in options.items()}
+        return ChainStage(constants, run.seed, device, samples, CompactConfig(**tuples))
     if name == "updater":
         single = trained["single"]
         assert isinstance(single, PaperNet)
@@ -168,13 +180,20 @@ def _stage(run: Run, name: str, device: torch.device, found: Checkpoint | None, 
     return SingleStage(constants, run.seed, device, samples, net)
 
 
+def _fill(net: Network, state: dict[str, Tensor]) -> None:
+    try:
+        net.load_state_dict(state)
+    except RuntimeError as error:
+        raise ValueError(f"the weights to begin with do not fit the network of their config: {error}") from error
+
+
 class _Loop:
     """One stage: optimiser, moving average, checkpoints."""
 
-    def __init__(self, run: Run, name: str, stage: Stage, found: Checkpoint | None, path: Path) -> None:
+    def __init__(self, run: Run, stage: Stage, found: Checkpoint | None, progress: Progress, path: Path) -> None:
         self.run, self.stage, self.path = run, stage, path
         self.constants = run.constants
-        self.progress = found.progress if found else Progress(name)
+        self.progress = progress
         c = self.constants
         if found:
             stage.model.load_state_dict(found.model)
