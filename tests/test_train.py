@@ -80,13 +80,15 @@ def test_a_run_begins_with_the_weights_of_another(tmp_path: Path) -> None:
     weights, config = load_weights(first / "weights.safetensors")
     begun = Run(second, steps=1, begin=first / "weights.safetensors", changes={"batch": 2, "rate": 1e-9, "muon": 1e-9})
     [progress] = train(begun, quiet=True)
-    assert progress.step == 1 and progress.began == config
+    assert progress.step == 1
+    assert progress.began == config
     after, told = load_weights(second / "weights.safetensors")
     assert told["options"] == config["options"]
     assert told["training"]["runs"][0]["began"]["training"]["runs"][0]["step"] == 2
     assert all(torch.allclose(after[name], weights[name], atol=2e-3) for name in weights)
     [resumed] = train(Run(second, steps=2, changes={"batch": 2}), resume=True, quiet=True)
-    assert resumed.step == 2 and resumed.began == config, "a resumed run knows its options and its beginning"
+    assert resumed.step == 2
+    assert resumed.began == config, "a resumed run knows its options and its beginning"
 
 
 def test_weights_that_a_run_cannot_begin_with_are_refused(tmp_path: Path) -> None:

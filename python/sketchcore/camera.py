@@ -159,3 +159,14 @@ def as_camera(view: str | Camera) -> Camera:
             raise KeyError(f"unknown viewpoint {view!r}; the viewpoints are {', '.join(VIEWPOINTS)}")
         return VIEWPOINTS[view]
     raise TypeError(f"a view is a viewpoint's name or a sketchcore.Camera, got {type(view).__name__}")
+
+
+def check_viewpoint(viewpoint: object) -> str:
+    """The viewpoint's name itself, if it is one of the 13.
+
+    Raises:
+        ValueError: if it is not (the message lists them).
+    """
+    if not isinstance(viewpoint, str) or viewpoint not in VIEWPOINTS:
+        raise ValueError(f"unknown viewpoint {str(viewpoint)[:80]!r}; the viewpoints are {', '.join(VIEWPOINTS)}")
+    return viewpoint

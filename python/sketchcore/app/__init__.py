@@ -2,7 +2,7 @@
 
 ink, document               strokes, the drawings they make, parts, and the immutable document of all
 session                     a document with undo, and the solid that belongs to it
-union, hints, advice        the scene of several parts; how drawings lie; which drawing would help most
+union, hints                the scene of several parts; how drawings lie
 photo                       a picture of a paper sketch as a drawing
 sessionfile, store          sessions as files
 workers                     reconstructions, fairly, in the background

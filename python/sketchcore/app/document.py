@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import unicodedata
 from collections.abc import Mapping, Sequence
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sketchcore.app.ink import Stroke, check_id, new_id, rasterize
-from sketchcore.camera import VIEWPOINTS
+from sketchcore.camera import QUARTER_VIEWS, VIEWPOINTS, check_viewpoint
 
 MAX_STROKES = 5_000
 """Of one drawing."""
@@ -22,17 +23,6 @@ MAX_PARTS = 64
 MAX_NAME = 80
 _SCALES = (0.05, 4.0)
 _FARTHEST = 2.0
-
-
-def check_viewpoint(viewpoint: object) -> str:
-    """The viewpoint's name itself, if it is one of the 13.
-
-    Raises:
-        ValueError: if it is not (the message lists them).
-    """
-    if not isinstance(viewpoint, str) or viewpoint not in VIEWPOINTS:
-        raise ValueError(f"unknown viewpoint {str(viewpoint)[:80]!r}; the viewpoints are {', '.join(VIEWPOINTS)}")
-    return viewpoint
 
 
 def check_name(name: object) -> str:
@@ -188,6 +178,26 @@ class Document:
     def inked(self) -> tuple[Sheet, ...]:
         """The current part's drawings that have ink."""
         return tuple(sheet for sheet in self.sheets if sheet.has_ink)
+
+    @property
+    def fingerprint(self) -> str:
+        """What the ink of the current part's drawings is known by; strokes of one id are the same."""
+        ids = [
+            (sheet.viewpoint, [stroke.id for stroke in sheet.strokes if stroke.kind == "ink"]) for sheet in self.inked
+        ]
+        return hashlib.sha256(repr((self.current, ids)).encode()).hexdigest()[:32]
+
+    def check_first(self, viewpoint: str) -> None:
+        """Refuses ink from a viewpoint that is none for a first drawing, if there is no such drawing yet.
+
+        Raises:
+            ValueError: then; it names the three-quarter viewpoints.
+        """
+        if viewpoint not in QUARTER_VIEWS and not any(sheet.viewpoint in QUARTER_VIEWS for sheet in self.inked):
+            raise ValueError(
+                f"the first drawing of a part is made from a three-quarter viewpoint ({', '.join(QUARTER_VIEWS)}); "
+                f"{viewpoint} comes after it"
+            )
 
     def sheet(self, viewpoint: str) -> Sheet:
         """The current part's drawing from a viewpoint; an empty one if there is none."""

@@ -23,8 +23,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sketchcore.app.document import check_viewpoint
-from sketchcore.camera import QUARTER_VIEWS
+from sketchcore.camera import QUARTER_VIEWS, check_viewpoint
 from sketchcore.drawing import INK, Composition
 from sketchcore.drawing import composition as measure
 from sketchcore.grids import IMAGE, as_drawings, silhouette

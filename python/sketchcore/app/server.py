@@ -26,8 +26,9 @@ from fastapi.routing import APIRoute
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import JSONResponse, StreamingResponse
 
-from sketchcore.app import advice, hints, photo
-from sketchcore.app.document import check_viewpoint, listed, placement_from_json, stroke_from_json
+from sketchcore import advice
+from sketchcore.app import hints, photo
+from sketchcore.app.document import listed, placement_from_json, stroke_from_json
 from sketchcore.app.events import Hub
 from sketchcore.app.examples import read_scene, read_tour
 from sketchcore.app.guard import TooLargeError
@@ -35,6 +36,7 @@ from sketchcore.app.session import Session
 from sketchcore.app.sessionfile import MAX_FILE, SUFFIX
 from sketchcore.app.store import Store
 from sketchcore.app.workers import Reconstruct, Workers
+from sketchcore.camera import check_viewpoint
 from sketchcore.mesh import MESH_SUFFIXES, extract_mesh, save_mesh
 from sketchcore.reconstruction import load_model
 from sketchcore.viewpoint import guess_viewpoint

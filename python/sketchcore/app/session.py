@@ -23,7 +23,6 @@ from sketchcore.app.document import (
     Placement,
     Sheet,
     check_name,
-    check_viewpoint,
     placement_to_json,
     sheet_to_json,
     stroke_to_json,
@@ -33,7 +32,7 @@ from sketchcore.app.ink import Stroke
 from sketchcore.app.order import Order, Progress
 from sketchcore.app.solids import Solid, Solids, as_solid
 from sketchcore.app.union import unite
-from sketchcore.camera import QUARTER_VIEWS
+from sketchcore.camera import QUARTER_VIEWS, check_viewpoint
 from sketchcore.grids import as_drawings
 from sketchcore.strokes import trace
 
@@ -137,7 +136,7 @@ class Session:
                 sheet = document.sheet(check_viewpoint(viewpoint))
                 if stroke.id not in {other.id for other in sheet.strokes}:
                     if stroke.kind == "ink":
-                        _check_first(document, viewpoint)
+                        document.check_first(viewpoint)
                     document = document.with_sheet(replace(sheet, strokes=(*sheet.strokes, stroke)))
                     documents.append(document)
             for document in documents:
@@ -160,7 +159,7 @@ class Session:
             raise ValueError("there are no lines in that picture")
         with self.lock:
             sheet = self.document.sheet(check_viewpoint(viewpoint))
-            _check_first(self.document, viewpoint)
+            self.document.check_first(viewpoint)
             construction = tuple(stroke for stroke in sheet.strokes if stroke.kind == "construction")
             self._change(self.document.with_sheet(replace(sheet, strokes=(*construction, *strokes))))
 
@@ -286,7 +285,7 @@ class Session:
             raise ValueError("there is nothing to reconstruct yet: draw something first")
         if viewpoints[0] not in QUARTER_VIEWS:
             raise ValueError("the three-quarter drawing is gone: draw one again, or undo")
-        return Order(document.current, _print(document), tuple(drawings), tuple(viewpoints))
+        return Order(document.current, document.fingerprint, tuple(drawings), tuple(viewpoints))
 
     def accept(self, volume: NDArray[np.generic], order: Order) -> bool:
         """Takes a reconstruction, whole or between two rounds.
@@ -305,7 +304,7 @@ class Session:
             if order.part != self.document.current or not self.document.inked:
                 return False
             key = self._solids.add(solid, order.print)
-            now = _print(self.document)
+            now = self.document.fingerprint
             if order.print == now or self._made_of != now:  # else what is shown is the very one, and this is an older
                 self._solid, self._made_of, self._solid_part = key, order.print, order.part
             self._solids.keep(self._needed())
@@ -327,7 +326,7 @@ class Session:
     def stale(self) -> bool:
         """Whether the drawings have other ink than the solid was made of."""
         with self.lock:
-            return bool(self.document.inked) and self._made_of != _print(self.document)
+            return bool(self.document.inked) and self._made_of != self.document.fingerprint
 
     def scene(self) -> Solid:
         """The union of the visible parts and the current solid."""
@@ -423,7 +422,7 @@ class Session:
     def _moved(self) -> bool:
         """After another document became the present one: finds its solid, or the part's stale one, or none."""
         self.revision += 1
-        now = _print(self.document)
+        now = self.document.fingerprint
         if not self.document.inked:
             self._solid = self._made_of = self._solid_part = None
         elif (known := self._solids.of(now)) is not None:
@@ -436,19 +435,3 @@ class Session:
         """Keys of the volumes without which something could not be shown or undone."""
         needed = {part.volume for document in self._history.documents() for part in document.parts}
         return needed if self._solid is None else needed | {self._solid}
-
-
-def _print(document: Document) -> str:
-    """What the ink of the current part's drawings is known by; strokes of one id are the same."""
-    ids = [
-        (sheet.viewpoint, [stroke.id for stroke in sheet.strokes if stroke.kind == "ink"]) for sheet in document.inked
-    ]
-    return hashlib.sha256(repr((document.current, ids)).encode()).hexdigest()[:32]
-
-
-def _check_first(document: Document, viewpoint: str) -> None:
-    if viewpoint not in QUARTER_VIEWS and not any(sheet.viewpoint in QUARTER_VIEWS for sheet in document.inked):
-        raise ValueError(
-            f"the first drawing of a part is made from a three-quarter viewpoint ({', '.join(QUARTER_VIEWS)}); "
-            f"{viewpoint} comes after it"
-        )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sketchcore.app.advice import best_view
+from sketchcore.advice import best_view
 from sketchcore.camera import VIEWPOINTS
 from sketchcore.evaluate.accuracy import settled
 from sketchcore.evaluate.figure import Figure

@@ -20,7 +20,7 @@ from sketchcore.nets.multiscale import MultiscaleNet
 from sketchcore.nets.precision import pick_device
 from sketchcore.nets.unet import PaperNet
 from sketchcore.nets.weights import save_weights
-from sketchcore.train.beginning import Beginning, read_beginning
+from sketchcore.train.beginning import read_beginning
 from sketchcore.train.chains import ChainStage
 from sketchcore.train.checkpoint import Checkpoint, Progress, load_checkpoint, save_checkpoint
 from sketchcore.train.optimizers import make_optimizers
@@ -151,7 +151,7 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
             )
         # A later stage that has begun shows that this one is done.
         begun = any(checkpoints[later].exists() for later in stages[index + 1 :])
-        progress = found.progress if found else Progress(name, began=beginning and beginning.record)
+        progress = found.progress if found else Progress(name, began=beginning.record if beginning else None)
         stage = _stage(run, progress, device, trained)
         try:
             if beginning and name in beginning.states:
@@ -170,7 +170,7 @@ def _stage(run: Run, progress: Progress, device: torch.device, trained: dict[str
     name, samples = progress.stage, progress.samples
     constants, options = run.constants, run.options or (progress.began or {}).get("options", {})
     if name == "compact":
-        tuples = {k: tuple(v) if isinstance(v, list) else v for k, v in options.items()}
+        tuples: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in options.items()}
         return ChainStage(constants, run.seed, device, samples, CompactConfig(**tuples))
     if name == "updater":
         single = trained["single"]

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 import sketchcore as sk
-from sketchcore.app.advice import best_view, unsure
+from sketchcore.advice import best_view, unsure
 from sketchcore.evaluate.advice import measure_advice
 from sketchcore.evaluate.parts import PARTS
 from sketchcore.nets.sketches import Sketches

@@ -7,8 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sketchcore.app.document import check_viewpoint
-from sketchcore.camera import VIEWPOINTS
+from sketchcore.camera import VIEWPOINTS, check_viewpoint
 from sketchcore.grids import SIDE, to_camera_grid
 
 Field = NDArray[np.float32]
