@@ -148,3 +148,15 @@ def test_bad_arguments_are_refused():
         as_camera(3)
     assert as_camera("top") is VIEWPOINTS["top"]
     assert as_camera(GOOD) is GOOD
+
+
+def test_a_turned_camera_sees_the_origin_where_it_was() -> None:
+    camera = Camera.orbit(20, 40, distance=3, fov_degrees=30)
+    turned = camera.turned(6.0, -8.0)
+    np.testing.assert_allclose(turned.rotation @ -turned.position, camera.rotation @ -camera.position, atol=1e-12)
+    np.testing.assert_allclose(turned.rotation @ turned.rotation.T, np.eye(3), atol=1e-12)
+    between = np.degrees(np.arccos(turned.position @ camera.position / 9.0))
+    assert between == pytest.approx(10.0)
+    assert camera.turned(0.0, 0.0) is camera
+    # About the axis to the right it goes up or down: what points to the right still does.
+    np.testing.assert_allclose(camera.turned(15.0, 0.0).rotation[0], camera.rotation[0], atol=1e-12)

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import affine_transform
 
 import sketchcore as sk
-from sketchcore.nets.placement import Placement, bounds, in_place, out_of_place, plausibility, seen_at
+from sketchcore.nets.placement import Placement, bounds, out_of_place, plausibility, seen_at
+from sketchcore.nets.search import in_place
 from sketchcore.nets.sketches import Sketches
 from sketchcore.outline import outline_iou
 from sketchcore.rounds import Volume
@@ -123,14 +124,53 @@ def test_a_drawing_in_its_place_is_not_touched() -> None:
     assert in_place(predict, sketches, first) is sketches
 
 
+class Turned:
+    """Predicts the very solid that a drawing shows, as it lies in the world that the claimed camera stands in: the less
+    surely, the more it is askew there, as networks do.
+    """
+
+    def __init__(self, camera: sk.Camera) -> None:
+        self.camera = camera
+
+    def __call__(self, samples: Sequence[Sketches]) -> Iterator[Volume]:
+        voxels = sk.voxelize(SHAPE).astype(np.float32)
+        for sketches in samples:
+            camera = sk.Camera.from_packed(sketches.cameras[0])
+            back = self.camera.rotation.T @ camera.rotation
+            sure = 1 - 0.01 * _between(camera, self.camera)
+            askew = affine_transform(voxels, back, offset=31.5 - back @ np.full(3, 31.5), order=1)
+            yield (sure * askew).astype(np.float32)
+
+
+def _between(one: sk.Camera, other: sk.Camera) -> float:
+    """Degrees between two cameras as seen from the world's origin."""
+    cosine = one.position @ other.position / np.linalg.norm(one.position) / np.linalg.norm(other.position)
+    return math.degrees(math.acos(min(1.0, float(cosine))))
+
+
+@pytest.mark.parametrize("turn", [(12.0, 0.0), (0.0, -12.0), (-9.0, 9.0)])
+def test_a_drawing_from_beside_its_viewpoint_finds_its_camera(turn: tuple[float, float]) -> None:
+    true = CAMERA.turned(*turn)
+    drawing = sk.draw(SHAPE, true)
+    sketches = alone(drawing)
+    predict = Turned(true)
+    [first] = predict([sketches])
+    found = sk.Camera.from_packed(in_place(predict, sketches, first, always=True).cameras[0])
+    assert _between(found, true) < 4.0
+    np.testing.assert_array_equal(sketches.cameras[0], CAMERA.packed)
+
+
 def test_of_several_drawings_each_finds_its_own_place() -> None:
     cameras = [CAMERA, sk.VIEWPOINTS["quarter-127"]]
     knowing = [Drawn(camera) for camera in cameras]
 
+    def nearest(row: NDArray[np.float64]) -> int:
+        return int(np.argmin([np.linalg.norm(row - camera.packed) for camera in cameras]))
+
     def predict(samples: Sequence[Sketches]) -> Iterator[Volume]:
         for sketches in samples:
             said = [
-                next(knowing[[c.packed.tolist() for c in cameras].index(row.tolist())]([alone(drawing, cameras[0])]))
+                next(knowing[nearest(row)]([alone(drawing, cameras[0])]))
                 for drawing, row in zip(sketches.drawings, sketches.cameras, strict=True)
             ]
             yield np.mean(said, axis=0)

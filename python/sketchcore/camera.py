@@ -118,6 +118,21 @@ class Camera:
         down = np.cross(forward, right)
         return cls(distance * position, np.stack([right, down, forward]), fov_degrees, *planes)
 
+    def turned(self, right: float, down: float) -> Camera:
+        """The camera carried around the world's origin, which it sees where it saw it before.
+
+        Args:
+            right: degrees of the turn about the camera's own axis to the right, and
+            down: about that which points down, both at once.
+        """
+        angle = math.radians(math.hypot(right, down))
+        if angle == 0:
+            return self
+        x, y, z = (right * self.rotation[0] + down * self.rotation[1]) / math.hypot(right, down)
+        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        turn = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+        return Camera(turn @ self.position, self.rotation @ turn.T, self.fov_degrees, self.near, self.far)
+
 
 def pack_cameras(cameras: Iterable[Camera]) -> NDArray[np.float64]:
     """float64 [n, 15], the form the Rust core takes.

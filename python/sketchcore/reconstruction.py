@@ -38,7 +38,7 @@ class Reconstruction:
 
     Attributes:
         probability: float32 [64, 64, 64], world grid (x, y, z), probability of occupancy.
-        views: the camera of each drawing.
+        views: the camera of each drawing; where it was looked for, the one that was found.
         trace: root-mean-square change of the probability in each round that was run.
         drawings: uint8 [n, 256, 256], the drawings as the network saw them, ink 255 on 0: those that were out of place,
             where they belong.
@@ -175,9 +175,10 @@ def reconstruct(
         tolerance: what that means: they stop after a round that moved fewer voxels to the other side of 0.5 than
             this share of those that are occupied; the first round, which moves most, may move 3.5 times as many. At
             0 they never stop early.
-        align: True looks for the place and size at which each drawing is the most plausible one of an object that is
-            centred in the world, with a largest side of 1/1.2, and moves and scales it so: drawings made by hand are
-            off centre, too small or too large. That takes a second or two for each. None does it where a drawing is
+        align: True looks for the place, size and camera at which each drawing is the most plausible one of an object
+            that is centred in the world, with a largest side of 1/1.2, and takes it so: drawings made by hand are off
+            centre, too small or too large, and made from a few degrees beside their viewpoint. The result's `views`
+            are the cameras that were found. That takes a second or two for each. None does it where a drawing is
             plainly out of place, False never.
         model: None for the weights inside the package, a path to weights, or a loaded model (`load_model`).
         device: None for CUDA where there is one, else the CPU.
@@ -227,7 +228,9 @@ def _run(
     before: Volume | None = None
     trace: list[float] = []
     if align is not False:
-        sketches = model.in_place(sketches, always=align is True)
+        placed = model.in_place(sketches, always=align is True)
+        if placed is not sketches:
+            sketches, views = placed, tuple(Camera.from_packed(row) for row in placed.cameras)
     for number, volume in enumerate(until_settled(model.rounds(sketches, iterations, start), tolerance)):
         if progress is not None:
             progress(number, iterations, volume)

@@ -88,12 +88,7 @@ def distorted(
 def turned(camera: Camera, degrees: float, random: np.random.Generator) -> Camera:
     """The camera turned about the world's origin, to a random side."""
     side = random.uniform(0, 2 * math.pi)
-    axis = math.cos(side) * camera.rotation[0] + math.sin(side) * camera.rotation[1]
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    a = math.radians(degrees)
-    turn = np.eye(3) + math.sin(a) * cross + (1 - math.cos(a)) * cross @ cross
-    return Camera(turn @ camera.position, camera.rotation @ turn.T, camera.fov_degrees, camera.near, camera.far)
+    return camera.turned(degrees * math.cos(side), degrees * math.sin(side))
 
 
 def widened(camera: Camera, share: float, random: np.random.Generator) -> Camera:

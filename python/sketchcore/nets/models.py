@@ -18,8 +18,8 @@ from sketchcore.nets.inference import CompactInference, flip_cells, whole
 from sketchcore.nets.multiscale import MultiscaleNet
 from sketchcore.nets.outlines import heed_outlines
 from sketchcore.nets.pieces import join_pieces
-from sketchcore.nets.placement import in_place
 from sketchcore.nets.precision import autocast, pick_device, place, unit
+from sketchcore.nets.search import in_place
 from sketchcore.nets.singleview import SingleViewModel
 from sketchcore.nets.sketches import Sketches
 from sketchcore.nets.unet import PaperNet
@@ -43,7 +43,7 @@ class Model(Protocol):
         ...
 
     def in_place(self, sketches: Sketches, always: bool = False) -> Sketches:
-        """The drawings moved to where they belong, as far as they are elsewhere and the network can tell.
+        """The drawings moved to where they belong, and their cameras, as far as the network can tell.
 
         It is looked for where they are plainly out of place; or `always`.
         """
