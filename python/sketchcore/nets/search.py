@@ -116,8 +116,6 @@ Attempt = Callable[[Sequence[Placement]], list[_Tried]]
 
 def _far(attempt: Attempt, here: _Tried) -> _Tried:
     """The place that solids' boxes point to, from where the drawing is and from where it would fit roughly."""
-    if here.plausibility == -math.inf:
-        return here
     camera = Camera.from_packed(here.sketches.cameras[0])
     tried = [here, *attempt([_roughly(here.sketches, camera)])]
     front = list(tried)
@@ -144,6 +142,8 @@ def _far(attempt: Attempt, here: _Tried) -> _Tried:
 
 def _refined(attempt: Attempt, begun: _Tried) -> _Tried:
     """From which side it was drawn, and the last pixels."""
+    if begun.plausibility == -math.inf:  # nothing is predicted that could be judged
+        return begun
 
     def score(one: _Tried) -> float:
         stray = (_numbers(one.place) - _numbers(begun.place)) / _NEAR_BY
