@@ -9,7 +9,7 @@ round.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -45,6 +45,16 @@ class CompactConfig:
     fused: int = 32
     world: tuple[int, int, int] = (32, 96, 192)
     groups: int = 8
+
+    @classmethod
+    def of_options(cls, options: Mapping[str, Any]) -> CompactConfig:
+        """The configuration of options by name; where they come out of JSON, tuples are lists.
+
+        Raises:
+            TypeError: for an option that there is not.
+        """
+        tuples: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in options.items()}
+        return cls(**tuples)
 
 
 class CompactNet(nn.Module):

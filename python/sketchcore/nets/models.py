@@ -181,10 +181,9 @@ def build_model(
     chosen = pick_device(device)
     kind, options = config.get("network"), dict(config.get("options", {}))
     if kind == "compact":
-        tuples: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in options.items()}
         try:
             with _Unfilled():
-                net = CompactNet(CompactConfig(**tuples))
+                net = CompactNet(CompactConfig.of_options(options))
         except TypeError as error:
             raise ValueError(f"the config is of another version of the network 'compact': {error}") from error
         _fill(net, state)

@@ -170,8 +170,7 @@ def _stage(run: Run, progress: Progress, device: torch.device, trained: dict[str
     name, samples = progress.stage, progress.samples
     constants, options = run.constants, run.options or (progress.began or {}).get("options", {})
     if name == "compact":
-        tuples: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in options.items()}
-        return ChainStage(constants, run.seed, device, samples, CompactConfig(**tuples))
+        return ChainStage(constants, run.seed, device, samples, CompactConfig.of_options(options))
     if name == "updater":
         single = trained["single"]
         assert isinstance(single, PaperNet)
