@@ -102,6 +102,13 @@ class AppServer:
         with urllib.request.urlopen(self.url + path, timeout=PATIENCE / 1000) as answer:
             return json.loads(answer.read())
 
+    def post(self, path: str, body: Any) -> Any:
+        """What another page would do."""
+        headers = {"Content-Type": "application/json"}
+        request = urllib.request.Request(self.url + path, json.dumps(body).encode(), headers, method="POST")
+        with urllib.request.urlopen(request, timeout=PATIENCE / 1000) as answer:
+            return json.loads(answer.read())
+
     def read(self, path: str) -> bytes:
         with urllib.request.urlopen(self.url + path, timeout=PATIENCE / 1000) as answer:
             content: bytes = answer.read()

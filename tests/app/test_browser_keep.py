@@ -61,6 +61,31 @@ def test_a_killed_server_has_lost_nothing(tmp_path: Path, new_hand):
         second.stop()
 
 
+def test_an_answer_that_comes_late_hides_nothing_newer(boxed, server):
+    # What the page asks for takes a second on its way back: what happens meanwhile it hears of by events alone.
+    page, id = boxed.page, boxed.id
+    page.evaluate("""() => {
+        const { fetch } = window;
+        window.fetch = async (...request) => {
+            const response = await fetch(...request);
+            const late = /[/]api[/]s[/][0-9a-f]+$/.test(request[0]) && (request[1]?.method ?? "GET") === "GET";
+            if (late) await new Promise((resolve) => setTimeout(resolve, 1000));
+            return response;
+        };
+    }""")
+    names = ["One", "Two", "Three"]
+    for name in names:  # another page's changes: the first makes this page ask, the others come while it waits
+        server.post(f"/api/s/{id}/call", {"name": name})
+        page.wait_for_timeout(300)
+    page.wait_for_function(f"{DESK}.state.name === 'Three'", timeout=5000)
+    server.post(f"/api/s/{id}/clear", {"viewpoint": FIRST})  # the solid goes with its last drawing
+    page.wait_for_timeout(300)
+    server.post(f"/api/s/{id}/undo", {})
+    page.wait_for_function(f"{DESK}.state.sheets.length === 1 && {DESK}.loaded === {DESK}.state.scene", timeout=5000)
+    page.wait_for_timeout(1500)  # nothing that comes later takes it back
+    assert boxed.silhouette().any()
+
+
 def test_where_one_was_survives_a_reload(boxed):
     boxed.press("navigate")
     boxed.page.evaluate(f"{STAGE}.turn(33, -7)")

@@ -132,6 +132,21 @@ def test_a_sweep_of_the_eraser_is_a_step_and_one_beside_the_ink_is_none() -> Non
     assert len(session.document.sheets[0].strokes) == 2
 
 
+def test_of_two_states_the_later_says_so() -> None:
+    session = Session()
+    moments = [session.moment]
+    session.add_strokes("quarter-037", [line(50)])
+    moments.append(session.moment)
+    session.report(Progress(0, 5, working=True))
+    moments.append(session.moment)
+    assert session.accept(np.zeros((64, 64, 64), np.uint8), session.order())
+    moments.append(session.moment)
+    session.undo()
+    moments.append(session.moment)
+    assert moments == sorted(set(moments))
+    assert Session(session.id).life != session.life
+
+
 def test_clear_leaves_construction_lines_and_delete_leaves_nothing() -> None:
     session = Session()
     session.add_strokes("quarter-037", [line(50), line(60, "construction")])
@@ -227,8 +242,8 @@ def test_freeze_begins_a_new_part_and_the_scene_is_the_union() -> None:
     assert session.document.sheets == ()
     assert session.document.parts == (part,)
     assert [s.viewpoint for s in part.sheets] == ["quarter-037"]
-    assert session.reference("quarter-037")[0]["kind"] == "construction"
-    assert session.reference("top") == []
+    assert session.document.reference("quarter-037")[0].kind == "construction"
+    assert session.document.reference("top") == ()
     with pytest.raises(ValueError, match="three-quarter"):
         session.add_strokes("front", [line()])
     session.add_strokes("quarter-037", [line()])
@@ -238,11 +253,11 @@ def test_freeze_begins_a_new_part_and_the_scene_is_the_union() -> None:
     assert ((session.scene() > 127) == ((cube(10, 20) + cube(40, 50)) > 0)).all()
     session.show(part.id, False)
     assert ((session.scene() > 127) == (cube(40, 50) > 0)).all()
-    assert session.reference("quarter-037") == []
+    assert session.document.reference("quarter-037") == ()
     session.undo()
     session.place(part.id, Placement((0.25, 0, 0)))
     assert session.scene()[30, 15, 15] > 127
-    assert session.reference("quarter-037") == []
+    assert session.document.reference("quarter-037") == ()
     session.rename(part.id, " Back ")
     assert session.document.parts[0].name == "Back"
     assert session.freeze().name == "Part 2"

@@ -213,6 +213,23 @@ class Document:
             sheets = (*self.sheets, sheet)
         return replace(self, sheets=sheets)
 
+    def reference(self, viewpoint: str) -> tuple[Stroke, ...]:
+        """Lines of the visible parts that stand where they were drawn, from a viewpoint, as construction lines.
+
+        Raises:
+            ValueError: for an unknown viewpoint.
+        """
+        check_viewpoint(viewpoint)
+        return tuple(
+            replace(stroke, kind="construction")
+            for part in self.parts
+            if part.visible and part.placement == Placement()
+            for sheet in part.sheets
+            if sheet.viewpoint == viewpoint
+            for stroke in sheet.strokes
+            if stroke.kind == "ink"
+        )
+
     def part(self, part: str) -> Part:
         """The part of an id.
 

@@ -50,8 +50,14 @@ class Hub:
                     del self._listeners[session.id]
 
 
+def sent_state(session: Session) -> dict[str, Any]:
+    """`Session.state`, and how late it is, so that a page can tell which of two that it was sent is the newer."""
+    with session.lock:
+        return {**session.state(), "life": session.life, "moment": session.moment}
+
+
 def summary(session: Session) -> dict[str, Any]:
-    """What tells a page whether to ask for more: revision, keys of solid and scene, progress and trouble."""
-    state = session.state()
-    kept = {key: state[key] for key in ("revision", "solid", "scene", "stale", "trouble")}
-    return {**kept, **state["progress"]}
+    """What tells a page whether to ask for more: revision, keys of solid and scene, progress and trouble; how late."""
+    whole = sent_state(session)
+    kept = {key: whole[key] for key in ("revision", "life", "moment", "solid", "scene", "stale", "trouble")}
+    return {**kept, **whole["progress"]}

@@ -28,8 +28,8 @@ from starlette.responses import JSONResponse, StreamingResponse
 
 from sketchcore import advice
 from sketchcore.app import hints, photo
-from sketchcore.app.document import listed, placement_from_json, stroke_from_json
-from sketchcore.app.events import Hub
+from sketchcore.app.document import listed, placement_from_json, stroke_from_json, stroke_to_json
+from sketchcore.app.events import Hub, sent_state
 from sketchcore.app.examples import read_scene, read_tour
 from sketchcore.app.guard import TooLargeError
 from sketchcore.app.session import Session
@@ -154,7 +154,7 @@ class Server:
             raise ValueError(f"{name} needs {', '.join(_CHANGES[name])}; there is no {missing[0]}")
         with session.lock:
             if self._was_done(session, body.get("op")):
-                return session.state()
+                return sent_state(session)
             _apply(session, name, body)
             self._remember(session, body.get("op"))
         if name == "reconstruct":
@@ -167,7 +167,7 @@ class Server:
         """Keeps a session, tells of it, and gives its state."""
         self.store.save(session)
         self.hub.tell(session)
-        return session.state()
+        return sent_state(session)
 
     def _was_done(self, session: Session, op: object) -> bool:
         with self._lock:
@@ -293,7 +293,7 @@ def build_router(server: Server) -> APIRouter:
 
     @router.get("/s/{id}")
     def state(id: str) -> dict[str, Any]:
-        return store.get(id).state()
+        return sent_state(store.get(id))
 
     @router.delete("/s/{id}")
     def delete(id: str) -> dict[str, str]:
@@ -360,7 +360,7 @@ def build_router(server: Server) -> APIRouter:
 
     @router.get("/s/{id}/reference/{viewpoint}")
     def reference(id: str, viewpoint: str) -> list[dict[str, Any]]:
-        return store.get(id).reference(viewpoint)
+        return [stroke_to_json(stroke) for stroke in store.get(id).document.reference(viewpoint)]
 
     # Last: {name} takes whatever no route above has taken.
     @router.post("/s/{id}/{name}")

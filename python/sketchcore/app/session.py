@@ -25,7 +25,6 @@ from sketchcore.app.document import (
     check_name,
     placement_to_json,
     sheet_to_json,
-    stroke_to_json,
 )
 from sketchcore.app.history import History
 from sketchcore.app.ink import Stroke
@@ -66,6 +65,9 @@ class Session:
     Attributes:
         id: 32 hexadecimal digits.
         revision: one more after every change of the document or of the solid.
+        life: an id of this object's own: who opens a kept session again gets another.
+        moment: one more after every change of what `state` says, progress too: of two states of one life the later has
+            the greater one.
         progress: of the reconstruction.
         trouble: what went wrong with the last reconstruction, a sentence; "" if nothing did.
     """
@@ -97,6 +99,8 @@ class Session:
         self._history = history if history is not None else History(Document())
         self._solids = Solids(volumes or {})
         self.revision = revision
+        self.life = ink.new_id()
+        self.moment = 0
         self.progress = Progress()
         self.trouble = ""
         self._solid = solid
@@ -309,12 +313,14 @@ class Session:
                 self._solid, self._made_of, self._solid_part = key, order.print, order.part
             self._solids.keep(self._needed())
             self.revision += 1
+            self.moment += 1
             return True
 
     def report(self, progress: Progress, trouble: str = "") -> None:
         """Says how a reconstruction goes."""
         with self.lock:
             self.progress, self.trouble = progress, trouble
+            self.moment += 1
 
     @property
     def solid(self) -> Solid | None:
@@ -379,23 +385,6 @@ class Session:
                 "trouble": self.trouble,
             }
 
-    def reference(self, viewpoint: str) -> list[dict[str, Any]]:
-        """Lines of the visible parts that stand where they were drawn, from a viewpoint, as construction lines.
-
-        Returns:
-            strokes as plain data.
-        """
-        check_viewpoint(viewpoint)
-        return [
-            stroke_to_json(stroke) | {"kind": "construction"}
-            for part in self.document.parts
-            if part.visible and part.placement == Placement()
-            for sheet in part.sheets
-            if sheet.viewpoint == viewpoint
-            for stroke in sheet.strokes
-            if stroke.kind == "ink"
-        ]
-
     def kept(self) -> Kept:
         """What has to be kept of it."""
         with self.lock:
@@ -422,6 +411,7 @@ class Session:
     def _moved(self) -> bool:
         """After another document became the present one: finds its solid, or the part's stale one, or none."""
         self.revision += 1
+        self.moment += 1
         now = self.document.fingerprint
         if not self.document.inked:
             self._solid = self._made_of = self._solid_part = None

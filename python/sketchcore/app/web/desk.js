@@ -4,13 +4,15 @@ import { reactive } from "vue";
 import { Outbox, Refused, listen, request, volume } from "./link.js";
 
 const FOLLOW = 1100; // milliseconds after the last change of a drawing until the shape follows
-const AGAIN = 1500; // milliseconds until a volume that could not be had is asked for again
+const AGAIN = 1500; // milliseconds until what could not be had, a volume or the state, is asked for again
 const CHECK = 3000; // milliseconds after the last stroke until the composition is looked at: not while one draws
 
 const EMPTY = {
   id: null,
   name: "",
   revision: -1,
+  life: null,
+  moment: -1,
   part: null,
   sheets: [],
   parts: [],
@@ -55,6 +57,7 @@ export class Desk {
     if (!keep && left.id && left.id !== id && left.revision === 0 && !this.now.waiting)
       request("DELETE", `/s/${left.id}`).catch(() => null);
     this.now.state = state;
+    this.told = null;
     this.loaded = null;
     this.included = new Set(state.stale ? [] : this.inked);
     Object.assign(this.now, { hints: [], advice: null, online: true });
@@ -81,6 +84,8 @@ export class Desk {
     this.source?.close();
     clearTimeout(this.following);
     clearTimeout(this.checking);
+    clearTimeout(this.refreshing);
+    this.refreshing = null;
   }
 
   // Changes
@@ -106,48 +111,60 @@ export class Desk {
 
   // What comes back
 
+  // Answers and events overtake each other on their ways, so each says how late it is: of what is known the latest
+  // counts, and where an event tells of a revision that no answer has brought, the state is asked for.
+
   take(state) {
     if (state.id !== this.state.id) return;
     this.now.waiting = this.outbox.operations.length;
-    if (state.revision < this.state.revision && this.now.online && !this.restarted) return;
-    this.restarted = false;
-    const before = this.state;
-    this.now.state = state;
-    if (!state.stale) this.included = new Set(this.inked);
-    this.heard.drawing();
-    this.loadScene();
-    if (JSON.stringify(state.sheets) !== JSON.stringify(before.sheets)) {
-      this.follow();
-      this.check();
+    if (!this.overtaken(state)) {
+      const before = this.state;
+      this.now.state = state;
+      if (!this.told || this.told.life !== state.life || this.told.revision < state.revision) this.told = state;
+      if (!state.stale) this.included = new Set(this.inked);
+      this.heard.drawing();
+      this.loadScene();
+      if (JSON.stringify(state.sheets) !== JSON.stringify(before.sheets)) {
+        this.follow();
+        this.check();
+      }
+      this.finish(before, state);
     }
-    this.finish(before, state);
+    if (this.behind) this.refresh();
   }
 
   hear(event) {
+    if (this.overtaken(event)) return;
     const before = { ...this.state };
-    const { revision, solid, scene, stale, trouble, ...progress } = event;
-    if (revision < before.revision) this.restarted = true;
-    const known = revision === before.revision;
-    Object.assign(this.state, { scene, solid, trouble, progress });
-    this.loadScene();
-    if (!known && !this.outbox.operations.length) this.refresh();
-    else if (known) this.state.stale = stale;
-    this.finish(before, this.state);
+    const { revision, life, moment, solid, scene, stale, trouble, ...progress } = event;
+    this.told = { revision, life };
+    if (life === before.life) {
+      Object.assign(this.state, { moment, scene, solid, trouble, progress });
+      this.loadScene();
+      if (!this.behind) this.state.stale = stale;
+      this.finish(before, this.state);
+    }
+    if (this.behind && !this.outbox.operations.length) this.refresh(); // else an answer is on its way
+  }
+
+  overtaken({ life, moment }) {
+    return life === this.state.life && moment < this.state.moment;
+  }
+
+  get behind() {
+    return this.told && (this.told.life !== this.state.life || this.told.revision !== this.state.revision);
   }
 
   // Something else changed the session: a round of the reconstruction, another page.
-  refresh() {
+  refresh(soon = 60) {
     if (this.refreshing) return;
+    const { id } = this.state;
     this.refreshing = setTimeout(async () => {
-      try {
-        const state = await request("GET", `/s/${this.state.id}`);
-        this.refreshing = null;
-        this.restarted = true;
-        this.take(state);
-      } catch {
-        this.refreshing = null;
-      }
-    }, 60);
+      const state = await request("GET", `/s/${id}`).catch(() => null);
+      this.refreshing = null;
+      if (state) this.take(state);
+      else if (this.behind && this.now.online && id === this.state.id) this.refresh(AGAIN);
+    }, soon);
   }
 
   finish(before, state) {
@@ -159,7 +176,6 @@ export class Desk {
   refuse(error) {
     this.now.waiting = this.outbox.operations.length;
     this.heard.say(error.message, "trouble");
-    this.restarted = true;
     this.refresh();
   }
 
