@@ -15,6 +15,7 @@ export class Pointers {
     const on = (name, handle, options) => root.addEventListener(name, handle, options);
     on("pointerdown", (event) => this.press(event));
     on("pointermove", (event) => this.move(event));
+    on("pointerrawupdate", (event) => this.draw(event, true)); // at once, where moves wait for the next frame
     on("pointerup", (event) => this.release(event));
     on("pointercancel", (event) => this.release(event, true));
     on("pointerleave", () => this.leave());
@@ -38,6 +39,7 @@ export class Pointers {
       return;
     }
     this.pressed = performance.now();
+    this.raw = false;
     if (this.stage.mode === "draw" && (event.button === 2 || event.button === 1 || palm)) this.stage.navigate();
     if (this.stage.mode !== "draw") return;
     event.preventDefault();
@@ -48,16 +50,23 @@ export class Pointers {
     this.note(event);
   }
 
+  /** Raw events come before the move that sums them up; where a browser has them the moves add nothing. */
+  draw(event, raw = false) {
+    if (!this.live || event.pointerId !== this.live.id) return false;
+    this.raw ||= raw;
+    if (this.raw !== raw) return true;
+    const ruled = event.shiftKey || this.stage.ruler;
+    const events = event.getCoalescedEvents?.() ?? [];
+    for (const one of events.length ? events : [event])
+      this.stage.extend(this.live, this.stage.toDrawing(one), pressure(one), ruled);
+    this.stage.lay(this.live);
+    this.note(event);
+    return true;
+  }
+
   move(event) {
     const before = this.down.get(event.pointerId);
-    if (this.live && event.pointerId === this.live.id) {
-      const ruled = event.shiftKey || this.stage.ruler;
-      const events = event.getCoalescedEvents?.() ?? [];
-      for (const one of events.length ? events : [event])
-        this.stage.extend(this.live, this.stage.toDrawing(one), pressure(one), ruled);
-      this.stage.lay(this.live);
-      this.note(event);
-    } else if (before && this.stage.mode !== "draw") {
+    if (!this.draw(event) && before && this.stage.mode !== "draw") {
       const [dx, dy] = [event.clientX - before.x, event.clientY - before.y];
       this.turning = true;
       if (this.down.size === 1) this.stage.turn(dx * TURN, dy * TURN);

@@ -9,7 +9,8 @@ const SCALES = [1, 0.71, 0.5, 0.35, 0.25];
 const SLOW = 45; // milliseconds a moving frame may take
 const QUICK = 18;
 const REST = 140; // milliseconds without motion, then the camera rests
-const PATIENT = 350; // milliseconds that a finer frame may take
+const PATIENT = 150; // milliseconds that a finer frame may take
+const CALM = 400; // milliseconds without a change before one is begun: more than between two rounds
 
 const CORNERS = [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [i & 1, (i >> 1) & 1, (i >> 2) & 1].map((x) => x - 0.5));
 const EDGES = CORNERS.flatMap((_, i) => [1, 2, 4].filter((bit) => !(i & bit)).map((bit) => [i, i | bit]));
@@ -78,7 +79,8 @@ export class VolumeView {
 
   /** Something has changed: draw a frame soon. `moving` says that more will change at once. */
   invalidate(moving = false) {
-    if (moving) this.movedAt = performance.now();
+    this.changedAt = performance.now();
+    if (moving) this.movedAt = this.changedAt;
     this.dirty = true;
     this.finer = false;
     this.schedule();
@@ -115,6 +117,9 @@ export class VolumeView {
       this.draw(state, ratio, false);
       this.schedule(); // to see how long it took
     } else if (!this.finer && this.last.scale === ratio && !this.last.moving) {
+      const early = this.changedAt + CALM - performance.now();
+      clearTimeout(this.calming);
+      if (early > 0) return void (this.calming = setTimeout(() => this.schedule(), early));
       const finer = Math.min(2, Math.sqrt(PATIENT / Math.max(this.last.milliseconds, 1)));
       this.finer = true;
       if (finer > 1.2) {
