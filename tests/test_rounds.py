@@ -109,10 +109,13 @@ def test_a_drawing_from_a_viewpoint_is_left_there(view: str) -> None:
     assert guess_camera(Oracle(), sk.draw(SHAPE, camera)) == (view, camera)
 
 
-def test_a_drawing_from_beside_a_viewpoint_is_traced_to_its_camera() -> None:
+@pytest.mark.parametrize("elevation", [4.0, 22.0])
+def test_a_drawing_from_elsewhere_is_traced_to_its_camera(elevation: float) -> None:
     azimuth = np.degrees(np.arctan2(*sk.VIEWPOINTS["quarter-307"].position[[2, 0]]))
-    camera = sk.Camera.orbit(azimuth - 10, 22, fov_degrees=30)
-    assert guess_camera(Oracle(), sk.draw(SHAPE, camera)) == ("quarter-307", camera)
+    camera = sk.Camera.orbit(azimuth - 15, elevation, fov_degrees=28)
+    name, found = guess_camera(Oracle(), sk.draw(SHAPE, camera))
+    assert (name, found.fov_degrees) == ("quarter-307", 28.0)
+    assert found.position == pytest.approx(camera.position)
 
 
 def test_what_crosses_is_counted_against_what_is_occupied() -> None:

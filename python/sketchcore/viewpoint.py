@@ -1,7 +1,9 @@
-"""Where a drawing was made from: one of the eight three-quarter viewpoints, or a camera near it.
+"""Where a drawing was made from: one of the eight three-quarter viewpoints, or a camera somewhere else.
 
-A camera is as plausible as the solid that is predicted from it fills the drawing's outline when seen from it: the
-prediction as it is, for once outlines are heeded every solid fills them.
+A viewpoint is as plausible as the solid that is predicted from it fills the drawing's outline when seen from it: the
+prediction as it is, for once outlines are heeded every solid fills them. Cameras that stand elsewhere are compared by
+how sure the prediction is of itself as well (`nets/placement.py`), and by how much of the ink runs along the axes that
+they see (`directions.py`).
 """
 
 from __future__ import annotations
@@ -14,17 +16,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sketchcore.camera import QUARTER_VIEWS, VIEWPOINTS, Camera, pack_cameras
+from sketchcore.directions import Directions
 from sketchcore.nets.models import Model
+from sketchcore.nets.placement import NEAR, plausibility
 from sketchcore.nets.sketches import Sketches
 from sketchcore.outline import outline_iou
 
 _POOR = 0.86
 """A viewpoint from which less of the outline is filled may not be where the drawing was made from."""
+_CLEARER = 0.12
+"""Nor may one when so much more ink runs along the axes of another camera: so it is in one of twenty exact drawings."""
+_WEIGHT = 0.25
+"""What such a share of the ink counts for beside a prediction's plausibility."""
 _GAIN = 0.03
-"""How much more of it another camera must fill."""
-_TURNS = (0.0, -10.0, 10.0)
-_ELEVATIONS = (38.0, 30.0, 22.0, 14.0)
-_FIELDS_OF_VIEW = (45.0, 30.0)
+"""How much better both together must be for another camera."""
+_STEP = 15
+_ELEVATIONS = (4.0, 14.0, 22.0, 30.0, 38.0)
+_FIELDS_OF_VIEW = (28.0, 45.0)
+_TRIED = 40
+"""Of these cameras, as many are tried as lines speak for most."""
 
 
 def guess_viewpoint(model: Model, drawing: NDArray[np.uint8]) -> list[str]:
@@ -40,26 +50,42 @@ def guess_viewpoint(model: Model, drawing: NDArray[np.uint8]) -> list[str]:
 def guess_camera(model: Model, drawing: NDArray[np.uint8]) -> tuple[str, Camera]:
     """The most plausible viewpoint's name, and its camera or one near it.
 
-    Where the viewpoint leaves part of the outline empty, others are tried as well, around it and around the opposite
-    one, of which drawings of many objects say the same: from lower down, from 10 degrees to either side, with a
-    narrower field of view. People draw from where they like.
+    Where the viewpoint leaves part of the outline empty, or lines run along other axes than it sees, cameras over half
+    the circle are tried as well, from lower down and with a narrower field of view too: people draw from where they
+    like. The other half says the same of many objects.
 
     Args:
         model: the network.
         drawing: uint8 [256, 256], ink 255 on 0.
     """
     fill, name = _ranked(model, drawing)[0]
-    if fill >= _POOR:
+    directions = Directions.of(drawing)
+    position = VIEWPOINTS[name].position
+    first = round(math.degrees(math.atan2(position[2], position[0])) / _STEP) * _STEP - 90
+    family = [
+        Camera.orbit(azimuth, elevation, fov_degrees=fov)
+        for azimuth, elevation, fov in itertools.product(range(first, first + 180, _STEP), _ELEVATIONS, _FIELDS_OF_VIEW)
+    ]
+    agreed, agreements = directions.agreement(VIEWPOINTS[name]), [directions.agreement(one) for one in family]
+    if fill >= _POOR and max(agreements) <= agreed + _CLEARER:
         return name, VIEWPOINTS[name]
-    tried = []
-    for near in (name, opposite(name)):
-        position = VIEWPOINTS[near].position
-        azimuth = math.degrees(math.atan2(position[2], position[0]))
-        for turn, elevation, fov in itertools.product(_TURNS, _ELEVATIONS, _FIELDS_OF_VIEW):
-            tried.append((near, Camera.orbit(azimuth + turn, elevation, fov_degrees=fov)))
-    fills = _plausibilities(model, drawing, [camera for _, camera in tried])
-    best, (near, camera) = max(zip(fills, tried, strict=True), key=lambda one: one[0])
-    return (near, camera) if best > fill + _GAIN else (name, VIEWPOINTS[name])
+    tried = sorted(range(len(family)), key=lambda i: -agreements[i])[:_TRIED]
+    cameras = [VIEWPOINTS[name], *(family[i] for i in tried)]
+    agreed_by = [agreed, *(agreements[i] for i in tried)]
+    sketches = _seen_by(drawing, cameras)
+    scores = [
+        plausibility(volume, seen, NEAR) + _WEIGHT * share
+        for volume, seen, share in zip(model.first_predictions(sketches), sketches, agreed_by, strict=True)
+    ]
+    best = max(range(len(cameras)), key=lambda i: scores[i])
+    if scores[best] <= scores[0] + _GAIN:
+        return name, VIEWPOINTS[name]
+    return _nearest(cameras[best]), cameras[best]
+
+
+def _nearest(camera: Camera) -> str:
+    """The three-quarter viewpoint that looks most nearly the same way."""
+    return max(QUARTER_VIEWS, key=lambda name: float(camera.rotation[2] @ VIEWPOINTS[name].rotation[2]))
 
 
 def opposite(name: str) -> str:
@@ -68,11 +94,12 @@ def opposite(name: str) -> str:
 
 
 def _ranked(model: Model, drawing: NDArray[np.uint8]) -> list[tuple[float, str]]:
-    fills = _plausibilities(model, drawing, [VIEWPOINTS[name] for name in QUARTER_VIEWS])
+    cameras = [VIEWPOINTS[name] for name in QUARTER_VIEWS]
+    volumes = model.first_predictions(_seen_by(drawing, cameras))
+    fills = [outline_iou(volume, camera, drawing) for volume, camera in zip(volumes, cameras, strict=True)]
     return sorted(zip(fills, QUARTER_VIEWS, strict=True), key=lambda one: one[0], reverse=True)
 
 
-def _plausibilities(model: Model, drawing: NDArray[np.uint8], cameras: Sequence[Camera]) -> list[float]:
-    sketches = Sketches(drawing[None], pack_cameras(cameras[:1]))
-    volumes = model.first_predictions([sketches.seen_by(pack_cameras([camera])) for camera in cameras])
-    return [outline_iou(volume, camera, drawing) for volume, camera in zip(volumes, cameras, strict=True)]
+def _seen_by(drawing: NDArray[np.uint8], cameras: Sequence[Camera]) -> list[Sketches]:
+    looked = Sketches(drawing[None], pack_cameras(cameras[:1]))
+    return [looked.seen_by(pack_cameras([camera])) for camera in cameras]

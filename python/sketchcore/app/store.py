@@ -33,7 +33,7 @@ from sketchcore.atomic import write_atomically
 
 _log = logging.getLogger(__name__)
 _ID = re.compile(r"[0-9a-f]{32}")
-_AT_HAND = 64
+_AT_HAND = 16
 """Sessions that stay in memory without being in use."""
 
 
