@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sketchcore as sk
-from sketchcore.evaluate.distort import STRENGTHS, distorted, turned, widened
+from sketchcore.evaluate.distort import STRENGTHS, distorted, faulty_style
 from sketchcore.evaluate.testset import load_testset
 from sketchcore.strokes import render, trace
 
@@ -83,13 +83,12 @@ def test_width_scale_and_shift(strength: int) -> None:
 def test_turned_and_widened_cameras() -> None:
     for seed, example in enumerate(load_testset(5)):
         camera = example.cameras[1]
-        random = np.random.default_rng(seed)
-        other = turned(camera, 20.0, random)
+        other = faulty_style({"viewpoint": 3}).camera(camera, seed)
         assert np.linalg.norm(other.position) == pytest.approx(np.linalg.norm(camera.position))
         forward = np.clip(camera.rotation[2] @ other.rotation[2], -1, 1)
         assert np.degrees(np.arccos(forward)) == pytest.approx(20, abs=1e-3)
         assert camera.rotation @ camera.position == pytest.approx(other.rotation @ other.position)
-        wide = widened(camera, 0.35, random)
+        wide = faulty_style({"field of view": 3}).camera(camera, seed)
         assert abs(wide.fov_degrees / camera.fov_degrees - 1) == pytest.approx(0.35)
 
         def size(c: sk.Camera) -> float:

@@ -38,6 +38,7 @@ from sketchcore.grids import (
     to_world_grid,
     voxelize,
 )
+from sketchcore.linestyle import STYLES, LineStyle
 from sketchcore.shape import Cuboid, Cylinder, Shape, Wedge
 from sketchcore.volume import iou
 
@@ -50,11 +51,13 @@ __version__ = version("sketchcore")
 
 __all__ = [
     "QUARTER_VIEWS",
+    "STYLES",
     "VIEWPOINTS",
     "Batch",
     "Camera",
     "Cuboid",
     "Cylinder",
+    "LineStyle",
     "Reconstruction",
     "Shape",
     "Wedge",

@@ -9,6 +9,7 @@ __all__ = [
     "bilateral",
     "buffers",
     "carve",
+    "check_style",
     "default_config",
     "draw",
     "evidence",
@@ -20,9 +21,14 @@ __all__ = [
     "lift_taps",
     "lift_transposed",
     "lines",
+    "random_style",
+    "redraw",
+    "render",
     "silhouettes",
+    "style_camera",
     "to_camera_grid",
     "to_world_grid",
+    "trace",
     "viewpoints",
     "voxelize",
     "voxelize_mesh",
@@ -46,6 +52,14 @@ def lines(
 def draw(
     shape: NDArray[np.float64], camera: NDArray[np.float64], out: NDArray[np.uint8] | None = None
 ) -> NDArray[np.uint8]: ...
+def check_style(style: str) -> None: ...
+def random_style(ranges: str, seed: int) -> str: ...
+def style_camera(camera: NDArray[np.float64], style: str, seed: int) -> NDArray[np.float64]: ...
+def redraw(
+    drawing: NDArray[np.uint8], style: str, seed: int, out: NDArray[np.uint8] | None = None
+) -> NDArray[np.uint8]: ...
+def render(strokes: list[NDArray[np.float32]], width: float) -> NDArray[np.uint8]: ...
+def trace(drawing: NDArray[np.uint8], least: int, step: int, through: bool) -> list[NDArray[np.float32]]: ...
 def to_camera_grid(
     volumes: NDArray[np.float32], cameras: NDArray[np.float64], out: NDArray[np.float32] | None = None
 ) -> NDArray[np.float32]: ...

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sketchcore import _core
 from sketchcore.camera import Camera, pack_cameras
 from sketchcore.destination import destination
+from sketchcore.linestyle import STYLES, LineStyle, as_style, check_seed
 from sketchcore.shape import Shape
 
 if TYPE_CHECKING:
@@ -94,20 +95,33 @@ def buffers(shape: Shape, camera: Camera, size: int = IMAGE) -> tuple[NDArray[np
     return _core.buffers(_as_shape(shape).packed, _as_camera(camera).packed, size)
 
 
-def draw(shape: Shape, camera: Camera, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
+def draw(
+    shape: Shape,
+    camera: Camera,
+    out: NDArray[np.uint8] | None = None,
+    *,
+    style: str | LineStyle = "clean",
+    seed: int = 0,
+) -> NDArray[np.uint8]:
     """The line drawing of a shape, uint8 [256, 256], ink 255 on 0 (Saito and Takahashi; paper, section 4.2).
 
     Args:
         shape: the shape.
         camera: where it is seen from.
         out: an array of the result's shape and dtype to write into, and to return.
+        style: how the lines are put down: a name from `sketchcore.STYLES`, or a `LineStyle`.
+        seed: of what is random in a style; the same one draws the same.
 
     Raises:
-        ValueError: if the camera stands inside the shape, or for an `out` of another shape, not C-contiguous or not
-            writeable.
-        TypeError: for anything but a `Shape` and a `Camera`, or an `out` of another dtype.
+        ValueError: if the camera stands inside the shape, for an unknown style or a seed outside 0 ... 2^64 - 1, or for
+            an `out` of another shape, not C-contiguous or not writeable.
+        TypeError: for anything but a `Shape` and a `Camera`, what is no style, or an `out` of another dtype.
     """
-    return _core.draw(_as_shape(shape).packed, _as_camera(camera).packed, destination(out, (IMAGE,) * 2, np.uint8))
+    hand, seed = as_style(style), check_seed(seed)
+    into = destination(out, (IMAGE,) * 2, np.uint8)
+    stand = hand.camera(_as_camera(camera), seed)
+    _core.draw(_as_shape(shape).packed, stand.packed, into)
+    return into if hand == STYLES["clean"] else hand.redraw(into, seed, into)
 
 
 def _as_volumes(volume: NDArray[np.floating], name: str) -> NDArray[np.float32]:

@@ -5,7 +5,7 @@
 //!         triangle mesh -> solid ----^
 //!                       |
 //!                     camera ----> raycast -> buffers -> lines -> pen       the drawing
-//!                                     |
+//!                                     |                    +-> trace -> stroke (by style) -> brush
 //!                                     +------> buffers::fill_frustum        the truth, camera grid
 //! batch: all of these for one sample, and samples side by side
 //!
@@ -20,6 +20,7 @@
 //! Only `python` knows about Python; everything else is plain Rust that `cargo test` runs.
 
 pub mod batch;
+pub mod brush;
 pub mod buffers;
 pub mod camera;
 pub mod carve;
@@ -41,5 +42,8 @@ pub mod random;
 pub mod raycast;
 pub mod resample;
 pub mod solid;
+pub mod stroke;
+pub mod style;
+pub mod trace;
 pub mod trilinear;
 pub mod voxel;
