@@ -1,4 +1,4 @@
-"""Drawings as strokes: lines traced from pixels to polylines, and polylines drawn as lines."""
+"""The slow twin of `rust/src/trace.rs`: scikit-image thins, a graph in Python is followed."""
 
 # mypy: disable-error-code="no-untyped-call"
 # (scikit-image says that it is typed, and is not.)
@@ -6,16 +6,13 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw
 from skimage.measure import approximate_polygon
 from skimage.morphology import skeletonize
 
 from sketchcore.drawing import INK
-from sketchcore.grids import IMAGE
 
 Polyline = NDArray[np.float64]
 """float64 [n, 2], n >= 2: (x, y) in pixels, x to the right, y down; a pixel's centre is at its indices."""
@@ -24,8 +21,6 @@ _CORNER = 40.0
 """Degrees that a line turns by at a corner, which ends one stroke and begins another."""
 _STRAIGHT = 1.5
 """Pixels that a line may stray from the straight one between two corners."""
-_FINE = 4
-"""Lines are drawn at so many times the resolution, then averaged."""
 
 
 def trace(drawing: NDArray[np.uint8]) -> list[Polyline]:
@@ -80,26 +75,3 @@ def _cut(path: Polyline) -> list[Polyline]:
     corners = kept[1:-1][turns > _CORNER]
     at = [0, *(int(np.flatnonzero((path == corner).all(axis=1))[0]) for corner in corners), len(path) - 1]
     return [path[a : b + 1] for a, b in itertools.pairwise(at) if b > a]
-
-
-def render(strokes: Sequence[Polyline], width: float) -> NDArray[np.uint8]:
-    """The drawing of strokes by a round pen: uint8 [256, 256], ink 255 on 0.
-
-    Args:
-        strokes: polylines, pixels; what lies outside the drawing is cut off.
-        width: of the pen, pixels.
-
-    Raises:
-        ValueError: for a width that is not more than 0.
-    """
-    if not width > 0:
-        raise ValueError(f"a pen's width must be more than 0 pixels, got {width}")
-    image = Image.new("L", (IMAGE * _FINE, IMAGE * _FINE))
-    pen = ImageDraw.Draw(image)
-    side = max(1, round(width * _FINE))
-    for stroke in strokes:
-        points = [tuple(point) for point in (stroke + 0.5) * _FINE - 0.5]
-        pen.line(points, fill=255, width=side, joint="curve")
-        for x, y in (points[0], points[-1]):
-            pen.ellipse((x - side / 2, y - side / 2, x + side / 2, y + side / 2), fill=255)
-    return np.asarray(image.reduce(_FINE))

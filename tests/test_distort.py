@@ -8,7 +8,7 @@ import pytest
 import sketchcore as sk
 from sketchcore.evaluate.distort import STRENGTHS, distorted, faulty_style
 from sketchcore.evaluate.testset import load_testset
-from sketchcore.strokes import render, trace
+from sketchcore.strokes import trace
 
 BOX = sk.Shape([sk.Cuboid((0, 0, 0), (0.4, 0.3, 0.35))])
 CAMERA = sk.VIEWPOINTS["quarter-052"]
@@ -51,7 +51,7 @@ def test_wobble_strays_as_far_as_it_says(strength: int) -> None:
 
 @pytest.mark.parametrize("strength", [1, 2, 3])
 def test_gaps_leave_out_their_share(strength: int) -> None:
-    total = len(_ink(render(trace(sk.draw(BOX, CAMERA)), 1.0)))
+    total = len(_ink(sk.LineStyle(antialias=True).redraw(sk.draw(BOX, CAMERA))))
     shares = [1 - len(_ink(_drawn("gaps", strength, seed))) / total for seed in range(4)]
     # A pen's end is round: each gap is shorter by its width.
     assert np.mean(shares) == pytest.approx(STRENGTHS["gaps"][strength - 1], abs=0.07)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, ImageDraw
 
 from sketchcore import _core
 from sketchcore.drawing import INK
-from sketchcore.grids import as_drawings
+from sketchcore.grids import IMAGE, as_drawings
 
 Polyline = NDArray[np.float64]
 """float64 [n, 2], n >= 2: (x, y) in pixels, x to the right, y down; a pixel's centre is at its indices."""
+
+_FINE = 4
+"""Lines are drawn at so many times the resolution, then averaged."""
 
 
 def trace(drawing: NDArray[np.uint8]) -> list[Polyline]:
@@ -40,8 +43,16 @@ def render(strokes: Sequence[Polyline], width: float) -> NDArray[np.uint8]:
         width: of the pen, pixels.
 
     Raises:
-        ValueError: for a width that is not more than 0, or a point with NaN or infinity.
+        ValueError: for a width that is not more than 0.
     """
-    if not 0 < width < math.inf:
+    if not width > 0:
         raise ValueError(f"a pen's width must be more than 0 pixels, got {width}")
-    return _core.render([np.ascontiguousarray(stroke, np.float32) for stroke in strokes], width)
+    image = Image.new("L", (IMAGE * _FINE, IMAGE * _FINE))
+    pen = ImageDraw.Draw(image)
+    side = max(1, round(width * _FINE))
+    for stroke in strokes:
+        points = [tuple(point) for point in (stroke + 0.5) * _FINE - 0.5]
+        pen.line(points, fill=255, width=side, joint="curve")
+        for x, y in (points[0], points[-1]):
+            pen.ellipse((x - side / 2, y - side / 2, x + side / 2, y + side / 2), fill=255)
+    return np.asarray(image.reduce(_FINE))

@@ -4,7 +4,7 @@
 //! random -> grammar -> csg ------> voxel                      the truth, world grid
 //!         triangle mesh -> solid ----^
 //!                       |
-//!                     camera ----> raycast -> buffers -> lines -> pen       the drawing
+//!                     camera ----> raycast -> buffers -> lines, kinds -> pen    the drawing
 //!                                     |                    +-> trace -> stroke (by style) -> brush
 //!                                     +------> buffers::fill_frustum        the truth, camera grid
 //! batch: all of these for one sample, and samples side by side
@@ -30,8 +30,10 @@ pub mod distance;
 pub mod error;
 pub mod evidence;
 pub mod grammar;
+pub mod hatching;
 mod intersect;
 pub mod isosurface;
+pub mod kinds;
 pub mod lift;
 pub mod lines;
 pub mod mesh;

@@ -11,7 +11,7 @@ pub const LEAST_INK: u8 = 64;
 /// Gaps are about so long.
 const GAP: f64 = 10.0;
 /// From point to point of a stroke, pixels.
-const STEP: usize = 2;
+pub const STEP: usize = 2;
 /// Points over which the direction of a stroke is measured, on either side.
 const REACH: usize = 3;
 /// What is left of width and ink at the very end of a tapered stroke.
@@ -26,13 +26,24 @@ pub fn redraw(drawing: &[u8], style: &LineStyle, random: &mut Random, out: &mut 
     }
     let strokes = trace(drawing, LEAST_INK, TraceConfig { step: STEP, through: true });
     out.fill(0);
-    put_down(strokes, style, random, out);
+    put_down(vec![(strokes, style.clone())], style, random, out);
     finish(style, random, out);
 }
 
-/// Adds strokes to a drawing.
-pub fn put_down(mut strokes: Vec<Stroke>, style: &LineStyle, random: &mut Random, out: &mut [u8]) {
-    place(&mut strokes, style, random);
+/// Adds strokes to a drawing, each group in a style of its own, all of them placed as `style` says.
+pub fn put_down(
+    mut groups: Vec<(Vec<Stroke>, LineStyle)>,
+    style: &LineStyle,
+    random: &mut Random,
+    out: &mut [u8],
+) {
+    place(groups.iter_mut().flat_map(|(strokes, _)| strokes), style, random);
+    for (strokes, style) in groups {
+        draw(strokes, &style, random, out);
+    }
+}
+
+fn draw(strokes: Vec<Stroke>, style: &LineStyle, random: &mut Random, out: &mut [u8]) {
     let mut lines = Vec::with_capacity(strokes.len() * style.strokes as usize);
     for stroke in strokes {
         beside(stroke, style, random, &mut lines);
@@ -61,13 +72,13 @@ pub fn finish(style: &LineStyle, random: &mut Random, out: &mut [u8]) {
 }
 
 /// Scales and moves the whole drawing.
-fn place(strokes: &mut [Stroke], style: &LineStyle, random: &mut Random) {
+fn place<'a>(strokes: impl Iterator<Item = &'a mut Stroke>, style: &LineStyle, random: &mut Random) {
     let center = (IMAGE - 1) as f32 / 2.0;
     let (sin, cos) =
         if style.shift > 0.0 { (random.unit() * std::f64::consts::TAU).sin_cos() } else { (0.0, 0.0) };
     let by = [(style.shift * cos) as f32, (style.shift * sin) as f32];
     if style.scale != 1.0 || style.shift > 0.0 {
-        for point in strokes.iter_mut().flat_map(|s| &mut s.points) {
+        for point in strokes.flat_map(|s| &mut s.points) {
             for axis in 0..2 {
                 point[axis] = center + style.scale as f32 * (point[axis] - center) + by[axis];
             }

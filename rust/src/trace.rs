@@ -56,6 +56,16 @@ pub fn trace(drawing: &[u8], least: u8, config: TraceConfig) -> Vec<Stroke> {
     strokes
 }
 
+/// Makes the lines of a drawing [256, 256] one pixel wide.
+pub fn thin(ink: &mut [u8]) {
+    let mut pixels = Pixels::of(ink, 1);
+    pixels.thin();
+    ink.fill(0);
+    for [x, y] in pixels.places.into_iter().map(point) {
+        ink[y as usize * IMAGE + x as usize] = 255;
+    }
+}
+
 /// The pixels of lines, with a border around.
 struct Pixels {
     ink: Vec<u8>,

@@ -1,10 +1,11 @@
 //! Styles, and drawings as strokes.
 
-use super::arrays::{all_finite, camera_of, checked, filled};
+use super::arrays::{camera_of, checked, filled, shape_of};
 use crate::batch::SampleConfig;
-use crate::brush::{self, Dab};
+use crate::buffers::Buffers;
 use crate::camera::IMAGE;
 use crate::error::CoreError;
+use crate::kinds::{self, Kinds};
 use crate::random::Random;
 use crate::style::LineStyle;
 use crate::trace::TraceConfig;
@@ -82,23 +83,41 @@ pub fn trace<'py>(
         .collect()
 }
 
-/// Strokes drawn by a round pen of one width, uint8 [256, 256].
+/// The pixels of lines behind the first surface, uint8 [256, 256].
 #[pyfunction]
-pub fn render<'py>(
+pub fn hidden_lines<'py>(
     py: Python<'py>,
-    strokes: Vec<PyReadonlyArrayDyn<'py, f32>>,
-    width: f32,
+    shape: PyReadonlyArrayDyn<'py, f64>,
+    camera: PyReadonlyArrayDyn<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<u8>>> {
+    let (shape, camera) = (shape_of(&shape)?, camera_of(&camera)?);
+    py.detach(|| kinds::hidden_lines(&shape, &camera))?.into_pyarray(py).reshape([IMAGE, IMAGE])
+}
+
+/// Lines of some kinds, in a style.
+#[pyfunction]
+#[pyo3(signature = (depth, normal, camera, hidden, lines, style, seed, out=None))]
+#[expect(clippy::too_many_arguments, reason = "all that a drawing depends on, each by name")]
+pub fn draw_kinds<'py>(
+    py: Python<'py>,
+    depth: PyReadonlyArrayDyn<'py, f32>,
+    normal: PyReadonlyArrayDyn<'py, f32>,
+    camera: PyReadonlyArrayDyn<'py, f64>,
+    hidden: Option<PyReadonlyArrayDyn<'py, u8>>,
+    lines: Vec<String>,
+    style: &str,
+    seed: u64,
+    out: Option<Bound<'py, PyArrayDyn<u8>>>,
 ) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
-    let mut pens = Vec::with_capacity(strokes.len());
-    for stroke in &strokes {
-        let points = checked(stroke, "a stroke", &[-1, 2])?;
-        all_finite(points, "a stroke")?;
-        pens.push(
-            points.as_chunks::<2>().0.iter().map(|&at| Dab { at, width, ink: 1.0 }).collect::<Vec<_>>(),
-        );
-    }
-    filled(py, None, &[IMAGE; 2], |out| {
-        pens.iter().for_each(|dabs| brush::draw(dabs, true, out));
+    let side = IMAGE as isize;
+    let depth = checked(&depth, "depth", &[side, side])?.to_vec();
+    let normal = checked(&normal, "normal", &[side, side, 3])?.as_chunks::<3>().0.to_vec();
+    let seen = Buffers { depth, normal, size: IMAGE };
+    let hidden = hidden.as_ref().map(|h| checked(h, "hidden", &[side, side])).transpose()?;
+    let (camera, style) = (camera_of(&camera)?, LineStyle::from_json(style)?);
+    let kinds = Kinds::of(lines.iter().map(String::as_str))?;
+    filled(py, out, &[IMAGE; 2], |out| {
+        kinds::draw(&seen, &camera, hidden, kinds, &style, &mut Random::new(seed, 0, STROKES), out);
         Ok::<_, CoreError>(())
     })
 }
