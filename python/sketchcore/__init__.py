@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, Any
 from sketchcore.camera import QUARTER_VIEWS, VIEWPOINTS, Camera
 from sketchcore.datagen.generate import Batch, generate
 from sketchcore.grids import (
+    LINES,
     buffers,
     carve,
     draw,
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
 __version__ = version("sketchcore")
 
 __all__ = [
+    "LINES",
     "QUARTER_VIEWS",
     "STYLES",
     "VIEWPOINTS",

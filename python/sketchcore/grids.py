@@ -114,15 +114,15 @@ def draw(
         out: an array of the result's shape and dtype to write into, and to return.
         lines: "all", which is "contours" and "creases" together, or one or several of these: "contours", where a
             surface ends before another one or before nothing; "creases", where normals jump; "ridges" and "valleys",
-            where a surface bends most, outwards or inwards; "suggestive", valleys of brightness under a light at the eye
-            (DeCarlo and others, 2003); "hidden", dashed, contours and creases behind the first surface; "hatching",
-            strokes in the shade.
+            where a surface bends most, outwards or inwards; "suggestive", valleys of brightness under a light at
+            the eye (DeCarlo and others, 2003); "hidden", dashed, contours and creases behind the first surface;
+            "hatching", strokes in the shade.
         style: how the lines are put down: a name from `sketchcore.STYLES`, or a `LineStyle`.
         seed: of what is random in a style; the same one draws the same.
 
     Raises:
-        ValueError: if the camera stands inside the shape, for unknown lines or styles, a seed outside 0 ... 2^64 - 1, or for
-            an `out` of another shape, not C-contiguous or not writeable.
+        ValueError: if the camera stands inside the shape, for unknown lines or styles, a seed outside 0 ... 2^64 - 1,
+            or for an `out` of another shape, not C-contiguous or not writeable.
         TypeError: for anything but a `Shape` and a `Camera`, what is no style, or an `out` of another dtype.
     """
     hand, seed, kinds = as_style(style), check_seed(seed), _as_kinds(lines)

