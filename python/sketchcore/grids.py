@@ -127,11 +127,12 @@ def draw(
     """
     hand, seed, kinds = as_style(style), check_seed(seed), _as_kinds(lines)
     into = destination(out, (IMAGE,) * 2, np.uint8)
-    stand = hand.camera(_as_camera(camera), seed)
+    stand = hand.packed_camera(_as_camera(camera), seed)
     if kinds is not None:
-        hidden = _core.hidden_lines(_as_shape(shape).packed, stand.packed) if "hidden" in kinds else None
-        return _core.draw_kinds(*buffers(shape, stand), stand.packed, hidden, kinds, hand.to_json(), seed, into)
-    _core.draw(_as_shape(shape).packed, stand.packed, into)
+        hidden = _core.hidden_lines(_as_shape(shape).packed, stand) if "hidden" in kinds else None
+        seen = buffers(shape, Camera.from_packed(stand))
+        return _core.draw_kinds(*seen, stand, hidden, kinds, hand.to_json(), seed, into)
+    _core.draw(_as_shape(shape).packed, stand, into)
     return into if hand == STYLES["clean"] else hand.redraw(into, seed, into)
 
 

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
@@ -74,7 +75,7 @@ class LineStyle:
 
     def to_json(self) -> str:
         """All numbers by name."""
-        return json.dumps(asdict(self))
+        return _to_json(self)
 
     @classmethod
     def from_json(cls, text: str) -> LineStyle:
@@ -108,9 +109,14 @@ class LineStyle:
 
     def camera(self, camera: Camera, seed: int = 0) -> Camera:
         """The camera that a drawing in this style is really made from, if it claims to be made from the given one."""
+        packed = self.packed_camera(camera, seed)
+        return camera if packed is camera.packed else Camera.from_packed(packed)
+
+    def packed_camera(self, camera: Camera, seed: int = 0) -> NDArray[np.float64]:
+        """`camera`'s result as `Camera.packed`."""
         if self.viewpoint == self.field_of_view == 0:
-            return camera
-        return Camera.from_packed(_core.style_camera(camera.packed, self.to_json(), check_seed(seed)))
+            return camera.packed
+        return _core.style_camera(camera.packed, self.to_json(), check_seed(seed))
 
     def redraw(
         self, drawing: NDArray[np.uint8], seed: int = 0, out: NDArray[np.uint8] | None = None
@@ -130,6 +136,11 @@ class LineStyle:
         if drawing.dtype != np.uint8:
             raise TypeError(f"a drawing must be uint8 (ink 255 on 0), got {drawing.dtype}")
         return _core.redraw(np.ascontiguousarray(drawing), self.to_json(), check_seed(seed), out)
+
+
+@lru_cache(maxsize=64)
+def _to_json(style: LineStyle) -> str:
+    return json.dumps(asdict(style))
 
 
 _KINDS: Mapping[type, str] = {float: "a number", int: "a whole number", bool: "True or False"}
