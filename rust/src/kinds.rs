@@ -164,10 +164,8 @@ impl<'a> Bends<'a> {
         let bends = if folds { self.greatest() } else { Vec::new() };
         for (i, ink) in ink.iter_mut().enumerate().filter(|&(i, _)| self.buffers.depth[i].is_finite()) {
             let (x, y) = ((i % IMAGE) as i64, (i / IMAGE) as i64);
-            let marked = WAYS.iter().any(|&way| {
-                (folds && self.folds(&bends, x, y, way, kinds))
-                    || (kinds.suggestive && self.darkens(x, y, way))
-            });
+            let folds = folds && WAYS.iter().any(|&way| self.folds(&bends, x, y, way, kinds));
+            let marked = folds || (kinds.suggestive && self.darkens(x, y, self.across(x, y)));
             if marked {
                 *ink = 255;
             }
@@ -217,6 +215,18 @@ impl<'a> Bends<'a> {
         let normal = |i: usize| Vec3::from(self.buffers.normal[i]).as_dvec3();
         let along = point(c) - point(a);
         Some((normal(c) - normal(a)).dot(along) / along.length_squared())
+    }
+
+    /// The way along which brightness bends upwards most.
+    fn across(&self, x: i64, y: i64) -> [i64; 2] {
+        let bend = |[dx, dy]: &[i64; 2]| {
+            let at = |k: i64| self.place(x + k * dx, y + k * dy).map(|i| self.light[i]);
+            // Diagonal neighbours are farther away.
+            let long = if dx * dy == 0 { 1.0 } else { 2.0 };
+            let bends = at(ACROSS).zip(at(-ACROSS)).zip(at(0)).map(|((a, b), c)| (a + b - 2.0 * c) / long);
+            bends.unwrap_or(f32::NEG_INFINITY)
+        };
+        WAYS.into_iter().max_by(|a, b| bend(a).total_cmp(&bend(b))).expect("there are four ways")
     }
 
     /// Whether it is darker here than on both sides, on one smooth surface.
