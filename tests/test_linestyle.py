@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import os
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
@@ -17,6 +19,7 @@ from scipy import ndimage
 
 import reference_strokes
 import sketchcore as sk
+from sketchcore import _core
 from sketchcore.datagen import default_config
 from sketchcore.evaluate.distort import STRENGTHS, faulty_style
 from sketchcore.linestyle import STYLES, LineStyle
@@ -192,6 +195,8 @@ def test_training_styles_come_on_top_of_what_there_was() -> None:
     assert 4 <= restyled.sum() <= 14
     one = sk.generate(2, 1, first=3, views=2, config={"hand": {"share": 0.5}, "styles": {"share": 0.5}}, threads=1)
     np.testing.assert_array_equal(one.drawings[0], half.drawings[3, :2])
+    two = sk.generate(2, 6, views=3, config={"hand": {"share": 0.5}, "styles": {"share": 0.5}}, threads=2)
+    np.testing.assert_array_equal(two.drawings, half.drawings)
 
 
 def test_styles_of_a_range_stay_within_it() -> None:
@@ -216,6 +221,21 @@ def test_strokes_are_where_the_slow_twin_has_them() -> None:
             assert np.mean(_distance(one)[other > 0] <= 2) > 0.99
         lengths = [sum(np.hypot(*np.diff(s, axis=0).T).sum() for s in strokes) for strokes in (fast, slow)]
         assert 0.85 < lengths[0] / lengths[1] < 1.02
+
+
+def test_a_pen_leaves_ink_as_far_as_it_is_wide() -> None:
+    rows, cols = np.mgrid[:256, :256].astype(np.float32)
+    for width, shape in zip((0.5, 1.0, 2.6), SHAPES, strict=False):
+        clean = sk.draw(shape, CAMERA)
+        ink = np.zeros((256, 256), np.float32)
+        for stroke in _core.trace(clean, 64, 2, True):
+            for (ax, ay), (bx, by) in itertools.pairwise(stroke):
+                dx, dy = bx - ax, by - ay
+                t = np.clip(((cols - ax) * dx + (rows - ay) * dy) / max(dx * dx + dy * dy, 1e-12), 0, 1)
+                distance = np.hypot(cols - ax - t * dx, rows - ay - t * dy)
+                ink = np.maximum(ink, np.clip(0.5 * max(width, 1) + 0.5 - distance, 0, 1) * min(width, 1))
+        drawn = sk.draw(shape, CAMERA, style=replace(PEN, width=width))
+        assert np.abs(drawn - 255 * ink).max() <= 1
 
 
 def _marked(points: np.ndarray) -> np.ndarray:
@@ -275,6 +295,8 @@ def test_unknown_lines_are_refused() -> None:
         sk.draw(CHAIR, CAMERA, lines="edges")
     with pytest.raises(ValueError, match="needs some lines"):
         sk.draw(CHAIR, CAMERA, lines=())
+    with pytest.raises(TypeError, match=r"hidden lines are those of a sketchcore\.Shape|expected a sketchcore\.Shape"):
+        sk.draw(trimesh.creation.box(), CAMERA, lines="hidden")  # type: ignore[arg-type]
 
 
 def test_default_config_names_every_range() -> None:

@@ -12,6 +12,7 @@ How a shape travels, and where each step lives:
 
     shape -> datagen            random shapes, drawings and volumes            (rust/src/grammar.rs ... batch.rs)
     drawing, camera             a picture as the networks want it, and where it was drawn from
+    linestyle, strokes          how lines are put down, and drawings as strokes     (rust/src/style.rs ... brush.rs)
     grids                       voxels, drawings, resampling, carving          (rust/src/voxel.rs ... resample.rs)
     nets                        the paper's networks, and the compact one that ships
     rounds                      the paper's iterative update over all drawings

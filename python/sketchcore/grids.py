@@ -129,7 +129,11 @@ def draw(
     into = destination(out, (IMAGE,) * 2, np.uint8)
     stand = hand.packed_camera(_as_camera(camera), seed)
     if kinds is not None:
-        hidden = _core.hidden_lines(_as_shape(shape).packed, stand) if "hidden" in kinds else None
+        hidden = None
+        if "hidden" in kinds:
+            if not isinstance(shape, Shape):
+                raise TypeError("hidden lines are those of a sketchcore.Shape: nothing else knows what lies behind")
+            hidden = _core.hidden_lines(shape.packed, stand)
         seen = buffers(shape, Camera.from_packed(stand))
         return _core.draw_kinds(*seen, stand, hidden, kinds, hand.to_json(), seed, into)
     _core.draw(_as_shape(shape).packed, stand, into)

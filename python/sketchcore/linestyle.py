@@ -60,15 +60,8 @@ class LineStyle:
     shift: float = 0.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value, kind = getattr(self, field.name), type(field.default)
-            if isinstance(value, np.generic):
-                value = value.item()
-            if isinstance(value, bool) != (kind is bool) or not isinstance(value, (int, kind)):
-                raise TypeError(f"line style: {field.name} must be {_KINDS[kind]}, got {type(value).__name__}")
-            if not math.isfinite(value):
-                raise ValueError(f"line style: {field.name} must be finite, got {value}")
-            object.__setattr__(self, field.name, kind(value))
+        for name in _NAMES:
+            object.__setattr__(self, name, _checked(name, getattr(self, name)))
         if self.strokes < 1:  # the core knows no negative count
             raise ValueError(f"line style: strokes must lie between 1 and 16, got {self.strokes}")
         _core.check_style(self.to_json())
@@ -88,10 +81,9 @@ class LineStyle:
         numbers = json.loads(text)
         if not isinstance(numbers, dict):
             raise ValueError(f"a line style is a JSON object, got {type(numbers).__name__}")
-        known = [field.name for field in fields(cls)]
         for name in numbers:
-            if name not in known:
-                raise ValueError(f"line style: unknown {name!r}; a style has {', '.join(known)}")
+            if name not in _NAMES:
+                raise ValueError(f"line style: unknown {name!r}; a style has {', '.join(_NAMES)}")
         return cls(**numbers)
 
     @classmethod
@@ -143,7 +135,20 @@ def _to_json(style: LineStyle) -> str:
     return json.dumps(asdict(style))
 
 
-_KINDS: Mapping[type, str] = {float: "a number", int: "a whole number", bool: "True or False"}
+def _checked(name: str, value: object) -> float | int | bool:
+    """A number of a style; the core knows its limits."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    switch, count = name == "antialias", name == "strokes"
+    if not isinstance(value, (int, float)) or isinstance(value, bool) != switch or (count and isinstance(value, float)):
+        kind = "True or False" if switch else "a whole number" if count else "a number"
+        raise TypeError(f"line style: {name} must be {kind}, got {type(value).__name__}")
+    if not math.isfinite(value):
+        raise ValueError(f"line style: {name} must be finite, got {value}")
+    return value if switch or count else float(value)
+
+
+_NAMES = tuple(field.name for field in fields(LineStyle))
 
 STYLES: Mapping[str, LineStyle] = MappingProxyType(
     {

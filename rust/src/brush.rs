@@ -58,8 +58,7 @@ fn draw_segments(dabs: &[Dab], sharpness: f32, canvas: &mut [u8]) {
             let py = row as f32 - a.at[1];
             let along = py * uy;
             let mut col = left.min(IMAGE - LANES);
-            loop {
-                let Some(pixels) = line[col..].first_chunk_mut::<LANES>() else { break };
+            while let Some(pixels) = line[col..].first_chunk_mut::<LANES>() {
                 for (k, pixel) in pixels.iter_mut().enumerate() {
                     let px = (col + k) as f32 - a.at[0];
                     let t = (px * ux + along).clamp(0.0, 1.0);

@@ -88,7 +88,7 @@ fn place<'a>(strokes: impl Iterator<Item = &'a mut Stroke>, style: &LineStyle, r
 
 /// A line by several strokes side by side, none quite parallel to the next.
 fn beside(stroke: Stroke, style: &LineStyle, random: &mut Random, lines: &mut Vec<Stroke>) {
-    if style.strokes == 1 || style.apart == 0.0 {
+    if style.strokes == 1 {
         lines.push(stroke);
         return;
     }
