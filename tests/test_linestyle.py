@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from PIL import Image
 from scipy import ndimage
 
+import reference
 import reference_strokes
 import sketchcore as sk
 from sketchcore import _core
@@ -277,6 +278,43 @@ def test_kinds_add_up() -> None:
         assert (hatched >= both).all()
         seen = np.isfinite(sk.buffers(shape, CAMERA)[0])
         assert not hatched[~seen].any(), "hatching stays on the shape"
+
+
+def _edges(half: tuple[float, float, float], camera: sk.Camera) -> tuple[np.ndarray, np.ndarray]:
+    """Places in the image along the edges of a box about the origin: all of them, and the hidden ones."""
+    every, hidden = [], []
+    for axis in range(3):
+        u, v = (a for a in range(3) if a != axis)
+        for sides in itertools.product((-1, 1), repeat=2):
+            points = np.zeros((400, 3))
+            points[:, axis] = np.linspace(-half[axis], half[axis], 400)
+            points[:, u], points[:, v] = sides[0] * half[u], sides[1] * half[v]
+            x, y, z = camera.rotation @ (points - camera.position).T
+            scale = math.tan(math.radians(camera.fov_degrees / 2)) * z
+            image = np.stack([(x / scale + 1) * 128 - 0.5, (y / scale + 1) * 128 - 0.5], axis=1)
+            every.append(image)
+            # A face is seen by an eye in front of it.
+            if not any(side * camera.position[a] > half[a] for a, side in zip((u, v), sides, strict=True)):
+                hidden.append(image)
+    return np.concatenate(every), np.concatenate([np.empty((0, 2)), *hidden])
+
+
+@settings(max_examples=40)
+@given(st.tuples(*[st.floats(0.1, 0.3)] * 3), reference.cameras())
+def test_hidden_lines_and_ridges_of_a_box_are_its_edges(half: tuple[float, float, float], camera: sk.Camera) -> None:
+    box = sk.Shape([sk.Cuboid((0, 0, 0), half)])
+    every, hidden = _edges(half, camera)
+    ink = _core.hidden_lines(box.packed, camera.packed)
+    for marked in (ink, sk.draw(box, camera, lines="hidden"), sk.draw(box, camera, lines="ridges")):
+        rows, cols = np.nonzero(marked)
+        # Along the border of the image an object that it cuts has an outline too.
+        inside = (np.minimum(rows, cols) > 3) & (np.maximum(rows, cols) < 252)
+        for place in np.stack([cols, rows], axis=1)[inside]:
+            assert np.hypot(*(every - place).T).min() < 2.5
+    seen, found = _distance(sk.draw(box, camera)), _distance(ink)
+    for x, y in np.rint(hidden).astype(int):
+        if min(x, y) > 4 and max(x, y) < 251 and seen[y, x] > 6:
+            assert found[y, x] <= 2
 
 
 def test_hidden_lines_lie_behind_what_is_seen() -> None:
