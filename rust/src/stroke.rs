@@ -12,6 +12,8 @@ pub const LEAST_INK: u8 = 64;
 const GAP: f64 = 10.0;
 /// From point to point of a stroke, pixels.
 pub const STEP: usize = 2;
+/// And beyond its ends, where it is straight.
+const BEYOND: f32 = 4.0;
 /// Points over which the direction of a stroke is measured, on either side.
 const REACH: usize = 3;
 /// What is left of width and ink at the very end of a tapered stroke.
@@ -111,7 +113,7 @@ fn overshoot(line: &mut Stroke, by: f32) {
     if line.closed || by <= 0.0 {
         return;
     }
-    let count = (by / STEP as f32).ceil() as usize;
+    let count = (by / BEYOND).ceil() as usize;
     for _ in 0..2 {
         let points = &mut line.points;
         let last = points.len() - 1;
