@@ -56,7 +56,7 @@ fn draw(strokes: Vec<Stroke>, style: &LineStyle, random: &mut Random, out: &mut 
             wobble(line, style, random);
         }
     }
-    let gone = gaps(&lines, style.gaps, random);
+    let gone = gaps(&lines, style.gaps, style.width, random);
     for (line, gone) in lines.iter().zip(&gone) {
         let dabs = dabs(line, style, random);
         for run in runs(gone) {
@@ -180,8 +180,8 @@ impl Waves {
 }
 
 /// Lifts the pen at random places until that share of all length is gone: for each line, whether each piece between two
-/// points is.
-fn gaps(lines: &[Stroke], share: f64, random: &mut Random) -> Vec<Vec<bool>> {
+/// points is. A pen is round: a gap is begun and ended half its width early and late.
+fn gaps(lines: &[Stroke], share: f64, width: f64, random: &mut Random) -> Vec<Vec<bool>> {
     let mut gone: Vec<Vec<bool>> = lines.iter().map(|l| vec![false; l.points.len() - 1]).collect();
     if share == 0.0 || lines.is_empty() {
         return gone;
@@ -204,16 +204,16 @@ fn gaps(lines: &[Stroke], share: f64, random: &mut Random) -> Vec<Vec<bool>> {
             let piece_long = f64::from(distance(pair[0], pair[1]));
             let middle = at + 0.5 * piece_long;
             at += piece_long;
-            if middle >= begin + long {
+            if middle >= begin + long + 0.5 * width {
                 break;
             }
-            if middle >= begin && !*piece {
+            if middle >= begin - 0.5 * width && !*piece {
                 *piece = true;
                 lost += piece_long;
             }
         }
         // A little each time, so that it comes to an end.
-        lack -= lost.max(0.25);
+        lack -= (lost * long / (long + width)).max(0.25);
     }
     gone
 }
@@ -325,7 +325,7 @@ mod tests {
         for share in [0.1, 0.25, 0.4] {
             let line = trace(&bar(), LEAST_INK, TraceConfig { step: 1, through: true });
             for seed in 0..5 {
-                let gone = gaps(&line, share, &mut Random::new(seed, 0, 0));
+                let gone = gaps(&line, share, 0.0, &mut Random::new(seed, 0, 0));
                 let lost = gone[0].iter().filter(|&&g| g).count() as f64 / gone[0].len() as f64;
                 assert!((lost - share).abs() < 0.03, "{share} {lost}");
             }
