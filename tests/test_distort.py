@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import sketchcore as sk
-from sketchcore.evaluate.distort import STRENGTHS, distorted, turned, widened
+from sketchcore.evaluate.distort import STRENGTHS, distorted, faulty_style
 from sketchcore.evaluate.testset import load_testset
-from sketchcore.strokes import render, trace
+from sketchcore.strokes import trace
 
 BOX = sk.Shape([sk.Cuboid((0, 0, 0), (0.4, 0.3, 0.35))])
 CAMERA = sk.VIEWPOINTS["quarter-052"]
@@ -51,7 +51,7 @@ def test_wobble_strays_as_far_as_it_says(strength: int) -> None:
 
 @pytest.mark.parametrize("strength", [1, 2, 3])
 def test_gaps_leave_out_their_share(strength: int) -> None:
-    total = len(_ink(render(trace(sk.draw(BOX, CAMERA)), 1.0)))
+    total = len(_ink(sk.LineStyle(antialias=True).redraw(sk.draw(BOX, CAMERA))))
     shares = [1 - len(_ink(_drawn("gaps", strength, seed))) / total for seed in range(4)]
     # A pen's end is round: each gap is shorter by its width.
     assert np.mean(shares) == pytest.approx(STRENGTHS["gaps"][strength - 1], abs=0.07)
@@ -83,13 +83,12 @@ def test_width_scale_and_shift(strength: int) -> None:
 def test_turned_and_widened_cameras() -> None:
     for seed, example in enumerate(load_testset(5)):
         camera = example.cameras[1]
-        random = np.random.default_rng(seed)
-        other = turned(camera, 20.0, random)
+        other = faulty_style({"viewpoint": 3}).camera(camera, seed)
         assert np.linalg.norm(other.position) == pytest.approx(np.linalg.norm(camera.position))
         forward = np.clip(camera.rotation[2] @ other.rotation[2], -1, 1)
         assert np.degrees(np.arccos(forward)) == pytest.approx(20, abs=1e-3)
         assert camera.rotation @ camera.position == pytest.approx(other.rotation @ other.position)
-        wide = widened(camera, 0.35, random)
+        wide = faulty_style({"field of view": 3}).camera(camera, seed)
         assert abs(wide.fov_degrees / camera.fov_degrees - 1) == pytest.approx(0.35)
 
         def size(c: sk.Camera) -> float:

@@ -12,6 +12,7 @@ How a shape travels, and where each step lives:
 
     shape -> datagen            random shapes, drawings and volumes            (rust/src/grammar.rs ... batch.rs)
     drawing, camera             a picture as the networks want it, and where it was drawn from
+    linestyle, strokes          how lines are put down, and drawings as strokes     (rust/src/style.rs ... brush.rs)
     grids                       voxels, drawings, resampling, carving          (rust/src/voxel.rs ... resample.rs)
     nets                        the paper's networks, and the compact one that ships
     rounds                      the paper's iterative update over all drawings
@@ -29,6 +30,7 @@ from typing import TYPE_CHECKING, Any
 from sketchcore.camera import QUARTER_VIEWS, VIEWPOINTS, Camera
 from sketchcore.datagen.generate import Batch, generate
 from sketchcore.grids import (
+    LINES,
     buffers,
     carve,
     draw,
@@ -38,6 +40,7 @@ from sketchcore.grids import (
     to_world_grid,
     voxelize,
 )
+from sketchcore.linestyle import STYLES, LineStyle
 from sketchcore.shape import Cuboid, Cylinder, Shape, Wedge
 from sketchcore.volume import iou
 
@@ -49,12 +52,15 @@ if TYPE_CHECKING:
 __version__ = version("sketchcore")
 
 __all__ = [
+    "LINES",
     "QUARTER_VIEWS",
+    "STYLES",
     "VIEWPOINTS",
     "Batch",
     "Camera",
     "Cuboid",
     "Cylinder",
+    "LineStyle",
     "Reconstruction",
     "Shape",
     "Wedge",

@@ -9,20 +9,27 @@ __all__ = [
     "bilateral",
     "buffers",
     "carve",
+    "check_style",
     "default_config",
     "draw",
+    "draw_kinds",
     "evidence",
     "evidence_fields",
     "frustum",
     "generate",
+    "hidden_lines",
     "isosurface",
     "lift",
     "lift_taps",
     "lift_transposed",
     "lines",
+    "random_style",
+    "redraw",
     "silhouettes",
+    "style_camera",
     "to_camera_grid",
     "to_world_grid",
+    "trace",
     "viewpoints",
     "voxelize",
     "voxelize_mesh",
@@ -46,6 +53,24 @@ def lines(
 def draw(
     shape: NDArray[np.float64], camera: NDArray[np.float64], out: NDArray[np.uint8] | None = None
 ) -> NDArray[np.uint8]: ...
+def hidden_lines(shape: NDArray[np.float64], camera: NDArray[np.float64]) -> NDArray[np.uint8]: ...
+def draw_kinds(
+    depth: NDArray[np.float32],
+    normal: NDArray[np.float32],
+    camera: NDArray[np.float64],
+    hidden: NDArray[np.uint8] | None,
+    lines: list[str],
+    style: str,
+    seed: int,
+    out: NDArray[np.uint8] | None = None,
+) -> NDArray[np.uint8]: ...
+def check_style(style: str) -> None: ...
+def random_style(ranges: str, seed: int) -> str: ...
+def style_camera(camera: NDArray[np.float64], style: str, seed: int) -> NDArray[np.float64]: ...
+def redraw(
+    drawing: NDArray[np.uint8], style: str, seed: int, out: NDArray[np.uint8] | None = None
+) -> NDArray[np.uint8]: ...
+def trace(drawing: NDArray[np.uint8], least: int, step: int, through: bool) -> list[NDArray[np.float32]]: ...
 def to_camera_grid(
     volumes: NDArray[np.float32], cameras: NDArray[np.float64], out: NDArray[np.float32] | None = None
 ) -> NDArray[np.float32]: ...

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sketchcore import _core
 from sketchcore.camera import Camera, pack_cameras
 from sketchcore.destination import destination
+from sketchcore.linestyle import STYLES, LineStyle, as_style, check_seed
 from sketchcore.shape import Shape
 
 if TYPE_CHECKING:
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 SIDE = 64
 IMAGE = 256
+LINES = ("contours", "creases", "ridges", "valleys", "suggestive", "hidden", "hatching")
+"""Kinds of lines that `draw` knows."""
 SIDES = (32, 64, 128, 256)
 """Grids that are resampled have so many cells along each side."""
 
@@ -94,20 +97,60 @@ def buffers(shape: Shape, camera: Camera, size: int = IMAGE) -> tuple[NDArray[np
     return _core.buffers(_as_shape(shape).packed, _as_camera(camera).packed, size)
 
 
-def draw(shape: Shape, camera: Camera, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
+def draw(
+    shape: Shape,
+    camera: Camera,
+    out: NDArray[np.uint8] | None = None,
+    *,
+    lines: str | Sequence[str] = "all",
+    style: str | LineStyle = "clean",
+    seed: int = 0,
+) -> NDArray[np.uint8]:
     """The line drawing of a shape, uint8 [256, 256], ink 255 on 0 (Saito and Takahashi; paper, section 4.2).
 
     Args:
         shape: the shape.
         camera: where it is seen from.
         out: an array of the result's shape and dtype to write into, and to return.
+        lines: "all", which is "contours" and "creases" together, or one or several of these: "contours", where a
+            surface ends before another one or before nothing; "creases", where normals jump; "ridges" and "valleys",
+            where a surface bends most, outwards or inwards; "suggestive", valleys of brightness under a light at
+            the eye (DeCarlo and others, 2003); "hidden", dashed, contours and creases behind the first surface;
+            "hatching", strokes in the shade.
+        style: how the lines are put down: a name from `sketchcore.STYLES`, or a `LineStyle`.
+        seed: of what is random in a style; the same one draws the same.
 
     Raises:
-        ValueError: if the camera stands inside the shape, or for an `out` of another shape, not C-contiguous or not
-            writeable.
-        TypeError: for anything but a `Shape` and a `Camera`, or an `out` of another dtype.
+        ValueError: if the camera stands inside the shape, for unknown lines or styles, a seed outside 0 ... 2^64 - 1,
+            or for an `out` of another shape, not C-contiguous or not writeable.
+        TypeError: for anything but a `Shape` and a `Camera`, what is no style, or an `out` of another dtype.
     """
-    return _core.draw(_as_shape(shape).packed, _as_camera(camera).packed, destination(out, (IMAGE,) * 2, np.uint8))
+    hand, seed, kinds = as_style(style), check_seed(seed), _as_kinds(lines)
+    into = destination(out, (IMAGE,) * 2, np.uint8)
+    stand = hand.packed_camera(_as_camera(camera), seed)
+    if kinds is not None:
+        hidden = None
+        if "hidden" in kinds:
+            if not isinstance(shape, Shape):
+                raise TypeError("hidden lines are those of a sketchcore.Shape: nothing else knows what lies behind")
+            hidden = _core.hidden_lines(shape.packed, stand)
+        seen = buffers(shape, Camera.from_packed(stand))
+        return _core.draw_kinds(*seen, stand, hidden, kinds, hand.to_json(), seed, into)
+    _core.draw(_as_shape(shape).packed, stand, into)
+    return into if hand == STYLES["clean"] else hand.redraw(into, seed, into)
+
+
+def _as_kinds(lines: str | Sequence[str]) -> list[str] | None:
+    """Names of kinds of lines; None for all that a drawing has by default."""
+    names = [lines] if isinstance(lines, str) else list(lines)
+    for name in names:
+        if name not in ("all", *LINES):
+            raise ValueError(f"unknown lines {name!r}; there are all, {', '.join(LINES)}")
+    if not names:
+        raise ValueError(f"a drawing needs some lines: all, {', '.join(LINES)}")
+    if names == ["all"]:
+        return None
+    return [kind for name in names for kind in (("contours", "creases") if name == "all" else (name,))]
 
 
 def _as_volumes(volume: NDArray[np.floating], name: str) -> NDArray[np.float32]:

@@ -8,6 +8,8 @@ use crate::grammar::GrammarConfig;
 use crate::lines::{LineConfig, draw};
 use crate::pen::{PenConfig, redraw};
 use crate::random::Random;
+use crate::stroke;
+use crate::style::StyleConfig;
 use crate::voxel::CELLS;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -25,6 +27,7 @@ pub struct SampleConfig {
     pub free: FreeConfig,
     pub lines: LineConfig,
     pub hand: HandConfig,
+    pub styles: StyleConfig,
     /// Rays a side by which a camera-grid cell is measured; at most 4.
     pub frustum_rays: usize,
 }
@@ -37,6 +40,7 @@ impl Default for SampleConfig {
             free: FreeConfig::default(),
             lines: LineConfig::default(),
             hand: HandConfig::default(),
+            styles: StyleConfig::default(),
             frustum_rays: 2,
         }
     }
@@ -110,6 +114,7 @@ impl SampleConfig {
         ];
         self.grammar.check()?;
         self.lines.check()?;
+        self.styles.check()?;
         if !(0.0..=1.0).contains(&self.displacement) {
             return bad("displacement must lie between 0 and 1");
         }
@@ -148,11 +153,13 @@ pub struct Slot<'a> {
     pub frusta: &'a mut [u8],
 }
 
-/// Purposes of a sample's random streams; the pen of view v is `PEN + v`, its free camera `FREE + v`.
+/// Purposes of a sample's random streams; the pen of view v is `PEN + v`, its free camera `FREE + v`, its
+/// style `STYLE + v`.
 const SHAPE: u64 = 0;
 const CAMERAS: u64 = 1;
 const PEN: u64 = 2;
 const FREE: u64 = 16;
+const STYLE: u64 = 32;
 
 /// Makes sample `index`, of as many views as `slot` has room for.
 pub fn sample(
@@ -168,6 +175,12 @@ pub fn sample(
     let cameras = draw_cameras(config, &shape, views, &mut Random::new(seed, index, CAMERAS), free);
     let arrays = slot.drawings.chunks_exact_mut(IMAGE * IMAGE).zip(slot.frusta.chunks_exact_mut(CELLS));
     for (v, ((stand, camera), (drawing, frustum))) in cameras.iter().zip(arrays).enumerate() {
+        fill_frustum(&shape, camera, config.frustum_rays, frustum)?;
+        let mut random = Random::new(seed, index, STYLE + v as u64);
+        if random.chance(config.styles.share) {
+            draw_in_style(config, &shape, camera, &mut random, drawing)?;
+            continue;
+        }
         let mut random = Random::new(seed, index, PEN + v as u64);
         if random.chance(config.hand.share) {
             let hand = hand_camera(&config.hand, stand, camera, &shape, &mut random);
@@ -177,9 +190,26 @@ pub fn sample(
         } else {
             draw(&shape, camera, &config.lines, drawing)?;
         }
-        fill_frustum(&shape, camera, config.frustum_rays, frustum)?;
     }
     Ok((shape, cameras.into_iter().map(|(_, camera)| camera).collect()))
+}
+
+/// Draws a shape in a style of its own, from about where the camera stands.
+fn draw_in_style(
+    config: &SampleConfig,
+    shape: &Shape,
+    camera: &Camera,
+    random: &mut Random,
+    drawing: &mut [u8],
+) -> Result<(), CoreError> {
+    let style = config.styles.draw(random);
+    let turned = style.camera(camera, random);
+    // A wide field of view brings it so near that it may stand within the shape.
+    let camera = if shape.contains(turned.position) { camera } else { &turned };
+    let mut lines = vec![0; IMAGE * IMAGE];
+    draw(shape, camera, &config.lines, &mut lines)?;
+    stroke::redraw(&lines, &style, random, drawing);
+    Ok(())
 }
 
 /// How far a batch is, for those who wait for it, and their means to stop it.

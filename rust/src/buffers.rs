@@ -6,7 +6,7 @@ use crate::camera::Camera;
 use crate::csg::Shape;
 use crate::dispatch::for_each_instruction_set;
 use crate::error::CoreError;
-use crate::raycast::{RAYS, RayCaster, TILE, Tile};
+use crate::raycast::{Hits, RAYS, RayCaster, TILE, Tile};
 use crate::voxel::{CELLS, SIDE};
 
 /// What a camera sees of a shape, pixel by pixel, row by row.
@@ -71,8 +71,13 @@ impl Pixels {
         if !tile.cast(caster, columns) {
             return None;
         }
-        let hits = tile.entries(None);
-        let (depth, normal) = (hits.depth(), tile.normals(caster, &hits));
+        Some(Self::of(caster, tile, &tile.entries(None)))
+    }
+
+    /// The surfaces that the rays of a tile meet.
+    #[inline(always)]
+    pub fn of(caster: &RayCaster, tile: &Tile, hits: &Hits) -> Self {
+        let (depth, normal) = (hits.depth(), tile.normals(caster, hits));
         let mut pixels = Self { depth: [0.0; RAYS], normal: [[0.0; RAYS]; 3] };
         for r in 0..RAYS {
             pixels.depth[r] = depth[r] as f32;
@@ -80,7 +85,7 @@ impl Pixels {
                 pixels.normal[axis][r] = normal[axis][r] as f32;
             }
         }
-        Some(pixels)
+        pixels
     }
 }
 

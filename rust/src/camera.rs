@@ -104,6 +104,29 @@ impl Camera {
         self
     }
 
+    /// Carried around the origin, which it sees where it saw it before: by degrees about its own axis to the right and
+    /// about that which points down, both at once.
+    pub fn turned(mut self, right: f64, down: f64) -> Self {
+        let angle = right.hypot(down);
+        if angle > 0.0 {
+            let axis = (self.axes[0] * right + self.axes[1] * down) / angle;
+            let turn = DMat3::from_axis_angle(axis.normalize(), angle.to_radians());
+            self.position = turn * self.position;
+            self.axes = self.axes.map(|a| turn * a);
+        }
+        self
+    }
+
+    /// With a field of view larger by this share, as far away as makes what lies at the origin look as large.
+    pub fn widened(&self, share: f64) -> Self {
+        let fov = (self.fov_degrees * (1.0 + share)).clamp(1.0, 170.0);
+        let ratio = self.half_image / (fov.to_radians() / 2.0).tan();
+        let by = (ratio - 1.0) * self.to_camera(DVec3::ZERO).z;
+        let position = self.position - self.axes[2] * by;
+        let near = (self.near + by).max(0.05);
+        Self::new(position, self.axes, fov, near, (self.far + by).max(2.0 * near)).unwrap_or(*self)
+    }
+
     /// How much of the displacement `by` (camera axes), between 0 and 1, leaves every point inside image and
     /// depth range. All conditions are linear in it.
     pub fn room_for(&self, by: DVec3, points: &[DVec3]) -> f64 {

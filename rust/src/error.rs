@@ -30,6 +30,8 @@ pub enum CoreError {
     EyeInside([f64; 3]),
     #[error("config: {0}")]
     Config(String),
+    #[error("line style: {0}")]
+    Style(String),
     #[error("views must be between 1 and 13 (there are 13 viewpoints), got {0}")]
     Views(usize),
     #[error(

@@ -4,8 +4,8 @@
 //! random -> grammar -> csg ------> voxel                      the truth, world grid
 //!         triangle mesh -> solid ----^
 //!                       |
-//!                     camera ----> raycast -> buffers -> lines -> pen       the drawing
-//!                                     |
+//!                     camera ----> raycast -> buffers -> lines, kinds -> pen    the drawing
+//!                                     |                    +-> trace -> stroke (by style) -> brush
 //!                                     +------> buffers::fill_frustum        the truth, camera grid
 //! batch: all of these for one sample, and samples side by side
 //!
@@ -20,6 +20,7 @@
 //! Only `python` knows about Python; everything else is plain Rust that `cargo test` runs.
 
 pub mod batch;
+pub mod brush;
 pub mod buffers;
 pub mod camera;
 pub mod carve;
@@ -29,8 +30,10 @@ pub mod distance;
 pub mod error;
 pub mod evidence;
 pub mod grammar;
+pub mod hatching;
 mod intersect;
 pub mod isosurface;
+pub mod kinds;
 pub mod lift;
 pub mod lines;
 pub mod mesh;
@@ -41,5 +44,8 @@ pub mod random;
 pub mod raycast;
 pub mod resample;
 pub mod solid;
+pub mod stroke;
+pub mod style;
+pub mod trace;
 pub mod trilinear;
 pub mod voxel;

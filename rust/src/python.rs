@@ -6,6 +6,7 @@ mod drawings;
 mod lift;
 mod pools;
 mod samples;
+mod strokes;
 mod views;
 mod volumes;
 
@@ -46,6 +47,8 @@ mod _core {
     use super::lift::{lift, lift_taps, lift_transposed};
     #[pymodule_export]
     use super::samples::{default_config, generate};
+    #[pymodule_export]
+    use super::strokes::{check_style, draw_kinds, hidden_lines, random_style, redraw, style_camera, trace};
     #[pymodule_export]
     use super::views::{buffers, draw, frustum, isosurface, lines, viewpoints};
     #[pymodule_export]

@@ -3,15 +3,15 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-/// Streams that one sample may use: purposes 0 to 31, so far apart that none runs into the next.
-const PURPOSES: u64 = 32;
+/// Streams that one sample may use: purposes 0 to 63, so far apart that none runs into the next.
+const PURPOSES: u64 = 64;
 const APART: u32 = 60;
 
 /// A stream of random numbers. Uses no function of the C library, so its values are bit-identical everywhere.
 pub struct Random(ChaCha8Rng);
 
 impl Random {
-    /// The stream of a seed's sample for one purpose, below 32.
+    /// The stream of a seed's sample for one purpose, below 64.
     pub fn new(seed: u64, sample: u64, purpose: u64) -> Self {
         debug_assert!(purpose < PURPOSES);
         let mut generator = ChaCha8Rng::seed_from_u64(seed);

@@ -152,7 +152,7 @@ def _held(contest: Contest, machine: Machine, repetitions: int) -> Row:
 
 def contests() -> list[Contest]:
     """The jobs, each on fixed inputs."""
-    return [_voxels(), _drawing(), *_resampling(), _solid(), *_samples()]
+    return [_voxels(), _drawing(), *_resampling(), _solid(), *_samples(), _style()]
 
 
 def _voxels() -> Contest:
@@ -192,6 +192,20 @@ def _drawing() -> Contest:
         moved=_PIXELS,
         # One intersection and one edge test a pixel.
         sums=_PIXELS * (30 + 20),
+    )
+
+
+def _style() -> Contest:
+    shapes = sk.generate(0, SHAPES).shapes
+    return Contest(
+        "a drawing in the style sketchy",
+        lambda: [sk.draw(shape, CAMERA, style="sketchy") for shape in shapes],
+        [("one clean draw", 3.0, lambda: lambda: [sk.draw(shape, CAMERA) for shape in shapes])],
+        units=SHAPES,
+        moved=2 * _PIXELS,
+        # A drawing's.
+        sums=_PIXELS * (30 + 20),
+        cost=True,
     )
 
 

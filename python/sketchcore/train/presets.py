@@ -106,6 +106,7 @@ COMPACT = Preset(
         },
         "free": {"share": 0.25, "elevation": [0.0, 60.0]},
         "hand": {"share": 0.7},
+        "styles": {"share": 0.4},
     },
 )
 
