@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any
 
 from sketchcore.camera import QUARTER_VIEWS, VIEWPOINTS, Camera
 from sketchcore.datagen.generate import Batch, generate
+from sketchcore.datagen.grammars import GRAMMARS, Grammar
 from sketchcore.grids import (
     buffers,
     carve,
@@ -38,7 +39,7 @@ from sketchcore.grids import (
     to_world_grid,
     voxelize,
 )
-from sketchcore.shape import Cuboid, Cylinder, Shape, Wedge
+from sketchcore.shape import Cuboid, Cylinder, Frustum, Shape, Torus, Wedge
 from sketchcore.volume import iou
 
 if TYPE_CHECKING:
@@ -49,14 +50,18 @@ if TYPE_CHECKING:
 __version__ = version("sketchcore")
 
 __all__ = [
+    "GRAMMARS",
     "QUARTER_VIEWS",
     "VIEWPOINTS",
     "Batch",
     "Camera",
     "Cuboid",
     "Cylinder",
+    "Frustum",
+    "Grammar",
     "Reconstruction",
     "Shape",
+    "Torus",
     "Wedge",
     "buffers",
     "carve",

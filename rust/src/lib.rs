@@ -1,7 +1,7 @@
 //! The kernels of sketchcore, in the order in which a shape travels:
 //!
 //! ```text
-//! random -> grammar -> csg ------> voxel                      the truth, world grid
+//! random -> grammar -> csg, fit -> voxel                      the truth, world grid
 //!         triangle mesh -> solid ----^
 //!                       |
 //!                     camera ----> raycast -> buffers -> lines -> pen       the drawing
@@ -28,6 +28,7 @@ mod dispatch;
 pub mod distance;
 pub mod error;
 pub mod evidence;
+pub mod fit;
 pub mod grammar;
 mod intersect;
 pub mod isosurface;

@@ -45,7 +45,7 @@ mod _core {
     #[pymodule_export]
     use super::lift::{lift, lift_taps, lift_transposed};
     #[pymodule_export]
-    use super::samples::{default_config, generate};
+    use super::samples::{default_config, fit, generate};
     #[pymodule_export]
     use super::views::{buffers, draw, frustum, isosurface, lines, viewpoints};
     #[pymodule_export]
