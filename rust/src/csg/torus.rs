@@ -33,11 +33,11 @@ impl Torus {
         let (u, v) = cross_axes(self.axis);
         let (mut lo, mut hi) = (-half, half);
         let [from, to] = self.arc;
-        let ends = [from, to].map(|degrees| degrees.to_radians().sin_cos());
+        let ends = [from, to].map(direction);
         // The arc reaches as far as the whole ring where it comes by an axis, else as far as its ends do.
         let passes = |degrees: f64| (degrees - from).rem_euclid(360.0) <= to - from;
         let inner = 1.0 - 2.0 * self.tube;
-        for (a, at, part) in [(u, 0.0, ends.map(|e| e.1)), (v, 90.0, ends.map(|e| e.0))] {
+        for (a, at, part) in [(u, 0.0, ends.map(|e| e[0])), (v, 90.0, ends.map(|e| e[1]))] {
             let most = part[0].max(part[1]);
             let least = part[0].min(part[1]);
             hi[a] = half[a] * if passes(at) { 1.0 } else { most.max(most * inner) };
@@ -58,16 +58,12 @@ impl Torus {
     pub fn ring(&self, half: DVec3) -> Ring {
         let (u, v) = cross_axes(self.axis);
         let middle = 1.0 - self.tube;
-        let [from, to] = self.arc.map(|degrees| {
-            let (sine, cosine) = degrees.to_radians().sin_cos();
-            [cosine, sine]
-        });
         let turn = self.arc[1] - self.arc[0];
         Ring {
             scale: [1.0 / half[u], 1.0 / half[v], self.tube / half[self.axis]],
             around: 4.0 * middle * middle,
             rest: middle * middle - self.tube * self.tube,
-            ends: [from, to],
+            ends: self.arc.map(direction),
             span: match turn {
                 t if t >= 360.0 => Span::Whole,
                 t if t > 180.0 => Span::Most,
@@ -75,6 +71,27 @@ impl Torus {
             },
         }
     }
+}
+
+/// Cosine and sine of an angle in degrees, by sums and products alone: the same on every machine.
+fn direction(degrees: f64) -> [f64; 2] {
+    let turns = (degrees.abs() / 90.0).round();
+    let x = (degrees.abs() - 90.0 * turns) * (std::f64::consts::PI / 180.0);
+    // The terms of the two series; the last are less than a rounding.
+    let (mut sine, mut cosine, mut term) = (x, 1.0, x);
+    for k in 1..10 {
+        term *= x / f64::from(2 * k);
+        cosine += if k % 2 == 1 { -term } else { term };
+        term *= x / f64::from(2 * k + 1);
+        sine += if k % 2 == 1 { -term } else { term };
+    }
+    let [cosine, sine] = match turns as i64 % 4 {
+        0 => [cosine, sine],
+        1 => [-sine, cosine],
+        2 => [-cosine, -sine],
+        _ => [sine, -cosine],
+    };
+    [cosine, if degrees < 0.0 { -sine } else { sine }]
 }
 
 /// How much of a ring there is: all of it, more than half, or half at most.
@@ -113,5 +130,42 @@ impl Ring {
             Span::Part => after & before,
         };
         (sum * sum <= self.around * flat) & within
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_are_cosines_and_sines() {
+        for k in -1440..=1440 {
+            let degrees = f64::from(k) * 0.5;
+            let ([cosine, sine], (s, c)) = (direction(degrees), degrees.to_radians().sin_cos());
+            assert!((cosine - c).abs() < 1e-14 && (sine - s).abs() < 1e-14, "{degrees}: {cosine} {sine}");
+            let [again, opposite] = direction(-degrees);
+            assert!(again == cosine && opposite == -sine);
+        }
+    }
+
+    #[test]
+    fn a_box_is_as_large_as_its_arc() {
+        let half = DVec3::new(0.4, 0.5, 0.1);
+        for (from, turn) in [(0.0, 360.0), (-90.0, 180.0), (20.0, 50.0), (100.0, 300.0), (-170.0, 30.0)] {
+            let torus = Torus { axis: 2, tube: 0.2, arc: [from, from + turn] };
+            let (ring, (lo, hi)) = (torus.ring(half), torus.corners(half));
+            let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+            for x in -200..=200 {
+                for y in -250..=250 {
+                    let at = DVec3::new(f64::from(x), f64::from(y), 0.0) * 0.002;
+                    if ring.hold(at.to_array()) {
+                        (least, most) = (least.min(at), most.max(at));
+                    }
+                }
+            }
+            for a in 0..2 {
+                assert!((least[a] - lo[a]).abs() < 0.005 && (most[a] - hi[a]).abs() < 0.005, "{from} {turn}");
+            }
+        }
     }
 }

@@ -1,7 +1,5 @@
 //! Frusta: between two flat ends, the four sides of a tapered cuboid or the mantle of a cone.
 
-#![expect(clippy::needless_range_loop, reason = "loops over the rays of a tile index many arrays at once")]
-
 use super::plane::Plane;
 use super::{Lanes, NO_DISTANCE, RAYS, greater, less};
 use crate::csg::{Slopes, cross_axes};

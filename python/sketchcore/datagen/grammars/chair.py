@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import sqrt
 
 from sketchcore.datagen.grammars.grammar import Grammar
 from sketchcore.datagen.grammars.parts import Dice, Parts, Range
@@ -67,7 +68,7 @@ class Chair(Grammar):
     """
 
     kinds: Mapping[str, float] = field(
-        default_factory=lambda: {"chair": 5.0, "office": 1.8, "stool": 1.2, "bench": 0.5, "sofa": 1.2}
+        default_factory=lambda: {"chair": 5.0, "office": 1.8, "stool": 1.2, "bench": 0.4, "sofa": 0.9}
     )
     height: Range = (0.38, 0.52)
     stool: Range = (0.38, 0.8)
@@ -145,7 +146,8 @@ class Chair(Grammar):
         if kind == "bench":
             width, form = dice.between(self.bench) / 2, "square"
         if kind == "stool":
-            depth, width = 0.85 * depth, 0.85 * width
+            depth, width = 0.75 * depth, 0.75 * width
+            top = max(top, 1.4 * width + depth)
             form = "round" if dice.chance(0.5) else "square"
         if kind == "sofa":
             depth, width, form = 1.25 * depth, 1.2 * width * dice.between((1.0, 2.4)), "square"
@@ -398,6 +400,7 @@ class Chair(Grammar):
         """A bow over spindles, as of a Windsor chair; upright, for a ring does not lean."""
         thick = max(0.9 * leg, 0.015)
         half = max(wide, 0.12)
+        upper = min(upper, seat.top + 2.8 * half)
         straight = dice.between((0.0, 0.5)) * (upper - seat.top)
         y = seat.top + straight
         x = at(lower)[0]
@@ -409,7 +412,7 @@ class Chair(Grammar):
             z = (k + 0.5) * 2 / count - 1
             if z >= -1e-9:
                 side = parts if abs(z) < 1e-9 else parts.both
-                high = y + (upper - y) * max(1 - z * z, 0.0) ** 0.5 - thick
+                high = y + (upper - y) * sqrt(max(1 - z * z, 0.0)) - thick
                 side.beam((x, lower, 0.9 * z * half), (x, high, z * half), (thin, thin), round=True, axis="y")
         if dice.chance(0.3):
             parts.box((x, y, 0.0), (thin, thick, half))
@@ -488,15 +491,11 @@ class Chair(Grammar):
 def _put_seat(parts: Parts, seat: Seat, dice: Dice) -> None:
     middle, half = seat.top - 0.5 * seat.thick, 0.5 * seat.thick
     if seat.round:
-        parts.cylinder((0.0, middle, 0.0), (seat.depth, half, seat.width))
-        if seat.thick > 0.06 and dice.chance(0.5):
-            # A bulging cushion.
-            parts.ring(
-                (0.0, middle, 0.0),
-                (seat.depth + half, half, seat.width + half),
-                "y",
-                min(2 * half / (seat.depth + half), 0.5),
-            )
+        # A rounded rim, whose tube is highest where the flat part ends.
+        tube = min(half / min(seat.depth, seat.width), 0.5) if seat.thick > 0.05 and dice.chance(0.6) else 0.0
+        parts.cylinder((0.0, middle, 0.0), ((1 - tube) * seat.depth, half, (1 - tube) * seat.width))
+        if tube:
+            parts.ring((0.0, middle, 0.0), (seat.depth, half, seat.width), "y", tube)
         return
     if seat.rear != seat.width:
         parts.beam(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from math import sqrt
 
 Point = tuple[float, float]
 """Radius and height."""
@@ -69,7 +70,7 @@ def hollow(outer: Sequence[Point], wall: float, floor: float) -> list[Point]:
         if y1 <= y0 or y1 <= floor:
             continue
         slope = (r1 - r0) / (y1 - y0)
-        across = wall * min(1.0 + slope * slope, 9.0) ** 0.5
+        across = wall * sqrt(min(1.0 + slope * slope, 9.0))
         for r, y in ((r0, y0), (r1, y1)):
             if y < floor:
                 r, y = r0 + slope * (floor - y0), floor

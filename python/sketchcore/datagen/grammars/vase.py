@@ -128,14 +128,14 @@ class Vase(Grammar):
         }
     )
     unevenness: float = 0.12
-    hollow: float = 0.85
+    hollow: float = 0.82
     wall: Range = (0.035, 0.07)
     feet: float = 0.5
     foot: Range = (0.03, 0.14)
     lips: float = 0.5
     lip: Range = (0.025, 0.06)
     lids: float = 0.35
-    square: float = 0.07
+    square: float = 0.09
     flattened: float = 0.08
     flat: Range = (0.5, 0.85)
     bands: float = 0.12
@@ -206,7 +206,7 @@ class Vase(Grammar):
             parts.turned([(wide, y - 0.5 * high), (wide, y + 0.5 * high)], squash=squash, round=round_)
             return [(r, y + 0.5 * high)]
         flare = smooth(
-            [(r, y), (r * dice.between((1.0, 1.15)), y + 0.6 * high), (r * dice.between((1.15, 1.5)), y + high)]
+            [(r, y), (r * dice.between((1.0, 1.15)), y + 0.8 * high), (r * dice.between((1.1, 1.3)), y + 1.5 * high)]
         )
         parts.turned(flare, squash=squash, round=round_)
         return flare[1:]
