@@ -11,6 +11,11 @@ Point = tuple[float, float]
 
 _STEPS = 8
 """Points of each span that are looked at."""
+_HERMITE = [
+    (t, (1 - t * t * (3 - 2 * t), t * t * (3 - 2 * t), t * (t - 1) * (t - 1), t * t * (t - 1)))
+    for t in (k / _STEPS for k in range(1, _STEPS + 1))
+]
+"""For each of them, how much of the two ends and of the ways there goes into it."""
 _TURN = 0.11
 """Square of the sine of the angle by which the next step may turn: 19 degrees; a crease is drawn from 30 on."""
 _AWAY = 0.006
@@ -18,16 +23,23 @@ _AWAY = 0.006
 
 
 def smooth(points: Sequence[Point]) -> list[Point]:
-    """A curve through points, from the bottom to the top: steps of a Catmull-Rom spline, rising all along."""
-    ends = [points[0], *points, points[-1]]
+    """A curve through points, from the bottom to the top, as steps that rise all along.
+
+    A spline of cubic pieces whose direction at each point is that from the one before it to the one after it.
+    """
+    lengths = [sqrt((r1 - r0) ** 2 + (y1 - y0) ** 2) for (r0, y0), (r1, y1) in pairwise(points)]
+    ways = []
+    for k in range(len(points)):
+        before, after = max(k - 1, 0), min(k + 1, len(points) - 1)
+        length = sum(lengths[before:after]) or 1.0
+        ways.append([(points[after][i] - points[before][i]) / length for i in (0, 1)])
     dense = [points[0]]
-    for (r0, y0), (r1, y1), (r2, y2), (r3, y3) in zip(ends, ends[1:], ends[2:], ends[3:], strict=False):
-        for k in range(1, _STEPS + 1):
-            t = k / _STEPS
-            a, b, c, d = t * (t * (2 - t) - 1), t * t * (3 * t - 5) + 2, t * (t * (4 - 3 * t) + 1), t * t * (t - 1)
-            r = 0.5 * (a * r0 + b * r1 + c * r2 + d * r3)
-            y = 0.5 * (a * y0 + b * y1 + c * y2 + d * y3)
-            dense.append((max(r, 0.0), min(max(y, dense[-1][1]), points[-1][1])))
+    for k, length in enumerate(lengths):
+        (r0, y0), (r1, y1), (dr0, dy0), (dr1, dy1) = points[k], points[k + 1], ways[k], ways[k + 1]
+        for t, (a, b, c, d) in _HERMITE:
+            r = a * r0 + b * r1 + length * (c * dr0 + d * dr1)
+            y = a * y0 + b * y1 + length * (c * dy0 + d * dy1)
+            dense.append((max(r, 0.0), min(max(y, dense[-1][1]), points[-1][1])) if t < 1 else points[k + 1])
     return _thinned(dense)
 
 
