@@ -260,6 +260,8 @@ class Chair(Grammar):
         back = dice.pick(self.backs)
         if kind == "office":
             back = dice.pick({"panel": 1.0, "pad": 3.0, "shell": 1.0, "oval": 0.8, "rungs": 0.5})
+        if back in ("shell", "hoop") and max(seat.width, seat.rear) > 1.3 * seat.depth:
+            back = "slats"  # what is round would be as deep as the seat is wide, or as high
         thin = max(0.6 * leg, 0.012)
         x0 = -seat.depth + leg if corners is None else corners[0]
         wide = seat.rear - leg if corners is None else corners[1]
