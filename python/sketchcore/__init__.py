@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any
 
 from sketchcore.camera import QUARTER_VIEWS, VIEWPOINTS, Camera
 from sketchcore.datagen.generate import Batch, generate
-from sketchcore.datagen.grammars import GRAMMARS, Grammar
+from sketchcore.datagen.grammars import GRAMMARS, Grammar, find_grammar
 from sketchcore.grids import (
     buffers,
     carve,
@@ -67,6 +67,7 @@ __all__ = [
     "carve",
     "datasets",
     "draw",
+    "find_grammar",
     "frustum",
     "generate",
     "iou",
