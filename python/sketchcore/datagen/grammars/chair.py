@@ -89,7 +89,7 @@ class Chair(Grammar):
             "rockers": 0.3,
         }
     )
-    leg: Range = (0.014, 0.032)
+    leg: Range = (0.011, 0.03)
     round: float = 0.4
     tapered: float = 0.4
     splay: Range = (0.03, 0.25)
@@ -428,8 +428,18 @@ class Chair(Grammar):
         broad = thin * dice.between((1.0, 2.4))
         rear = -seat.depth - slope * up
         front = seat.depth * dice.between((0.3, 1.0))
-        kind = dice.pick({"posts": 3.0, "panel": 0.8, "loop": 0.8, "slanted": 1.0})
+        tee = 3.0 if kind == "office" else 0.3
+        kind = dice.pick({"posts": 3.0, "panel": 0.8, "loop": 0.8, "slanted": 1.0, "tee": tee})
+        if kind == "tee":
+            # A pad on a post in the middle of the seat's side.
+            broad, x = max(broad, 0.02), 0.5 * (front + rear)
+            parts.both.box((x, y, z), (0.4 * (front - rear), thin, broad))
+            parts.both.beam((x, seat.bottom + 0.3 * seat.thick, z), (x, y, z), (2 * thin, thin), axis="y")
+            low = seat.bottom + 0.5 * min(seat.thick, 0.06)
+            parts.both.beam((x, low, 0.5 * seat.rear), (x, low, z), (2 * thin, 0.5 * min(seat.thick, 0.06)), axis="z")
+            return
         if kind == "panel":
+            thin *= dice.between((1.0, 2.5))
             parts.both.box(
                 (0.5 * (front - seat.depth), 0.5 * (seat.bottom + y), z),
                 (0.5 * (front + seat.depth), 0.5 * (y - seat.bottom), thin),

@@ -128,8 +128,8 @@ class Vase(Grammar):
         }
     )
     unevenness: float = 0.12
-    hollow: float = 0.82
-    wall: Range = (0.035, 0.07)
+    hollow: float = 0.76
+    wall: Range = (0.03, 0.065)
     feet: float = 0.5
     foot: Range = (0.03, 0.14)
     lips: float = 0.5
