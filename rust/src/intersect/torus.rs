@@ -14,8 +14,9 @@ pub const STRETCHES: usize = 3;
 #[derive(Clone, Copy)]
 pub struct Arc {
     ring: Ring,
-    /// Square of the tube's share of the stretched ring, for normals.
+    /// Radius of the circle that the tube is around, and the square of the hole's.
     middle: f64,
+    hole: f64,
     axes: [usize; 3],
     /// The eye, in coordinates in which the ring is round.
     eye: [f64; 3],
@@ -38,7 +39,8 @@ impl Arc {
         };
         let ends = [end([from[1], -from[0]]), end([-to[1], to[0]])];
         let eye = [0, 1, 2].map(|k| origin[axes[k]] * ring.scale[k]);
-        Self { ring, middle: 1.0 - torus.tube, axes, eye, ends }
+        let hole = 1.0 - 2.0 * torus.tube;
+        Self { ring, middle: 1.0 - torus.tube, hole: hole * hole, axes, eye, ends }
     }
 
     /// Where rays that are in the box around the ring from `start` to `end` are inside, from the eye on: stretches, and
@@ -73,6 +75,9 @@ impl Arc {
                     near = at.min(near);
                 }
             }
+            if self.ring.span == Span::Part && start[r].min(near) <= end[r].max(far) {
+                continue;
+            }
             for [from, to] in self.stretches(direction, r, start[r], end[r]).into_iter().flatten() {
                 match self.ring.span {
                     Span::Whole => keep(from, to),
@@ -92,13 +97,23 @@ impl Arc {
     /// The stretches of one ray inside the whole ring.
     #[inline(always)]
     fn stretches(&self, direction: &[Lanes; 3], r: usize, start: f64, end: f64) -> [Option<[f64; 2]>; 2] {
-        // The part in the box, with x from -1 to 1 along it: a^2 + b^2 is a polynomial of x, and so is the sum.
-        let (first, last) = (1.0 / start, 1.0 / end);
+        let along = [0, 1, 2].map(|k| direction[self.axes[k]][r] * self.ring.scale[k]);
+        let (mut first, mut last) = (1.0 / start, 1.0 / end);
+        // All of the ring is within a circle of radius 1, and none of it near the axis.
+        let (da, db, [a, b, _]) = (along[0], along[1], self.eye);
+        let (qa, qb, qc) = (da * da + db * db, a * da + b * db, a * a + b * b - 1.0);
+        let root = (qb * qb - qa * qc).max(0.0).sqrt();
+        if qa > 1e-12 {
+            first = first.max((-qb - root) / qa);
+            last = last.min((-qb + root) / qa);
+        }
+        let flat = |t: f64| qa * t * t + 2.0 * qb * t + qc + 1.0;
+        if first >= last || flat(first).max(flat(last)) < self.hole {
+            return [None; 2];
+        }
+        // The part that is left, with x from -1 to 1 along it: a^2 + b^2 is a polynomial of x, and so is the sum.
         let (middle, reach) = (0.5 * (first + last), 0.5 * (last - first));
-        let ray = [0, 1, 2].map(|k| {
-            let along = direction[self.axes[k]][r] * self.ring.scale[k];
-            [self.eye[k] + along * middle, along * reach]
-        });
+        let ray = [0, 1, 2].map(|k| [self.eye[k] + along[k] * middle, along[k] * reach]);
         let square = |[p, q]: [f64; 2]| [p * p, 2.0 * p * q, q * q];
         let [a, b, c] = ray.map(square);
         let flat = [0, 1, 2].map(|k| a[k] + b[k]);
@@ -200,7 +215,9 @@ fn between<const N: usize, const ROOTS: usize, const PLACES: usize>(
         let to = if k < count { places[k].clamp(from, 1.0) } else { 1.0 };
         let at_to = value(p, to);
         if (at_from < 0.0) != (at_to < 0.0) && number < ROOTS {
-            roots[number] = root(p, from, to, at_from < 0.0);
+            // Places between roots need not be as exact as the last roots.
+            let exact = if N == 5 { 1e-15 } else { 1e-8 };
+            roots[number] = root(p, from, to, at_from < 0.0, exact);
             number += 1;
         }
         (from, at_from) = (to, at_to);
@@ -210,7 +227,7 @@ fn between<const N: usize, const ROOTS: usize, const PLACES: usize>(
 
 /// The root between two places, by Newton's steps where they stay between them, else by halving.
 #[inline(always)]
-fn root<const N: usize>(p: &[f64; N], mut from: f64, mut to: f64, rises: bool) -> f64 {
+fn root<const N: usize>(p: &[f64; N], mut from: f64, mut to: f64, rises: bool, exact: f64) -> f64 {
     let mut x = 0.5 * (from + to);
     for _ in 0..100 {
         let (mut y, mut slope) = (p[N - 1], 0.0);
@@ -224,11 +241,10 @@ fn root<const N: usize>(p: &[f64; N], mut from: f64, mut to: f64, rises: bool) -
             to = x;
         }
         let next = x - y / slope;
-        let next = if next > from && next < to { next } else { 0.5 * (from + to) };
-        if (next - x).abs() <= 1e-15 {
-            return next;
+        if (next - x).abs() <= exact || to - from <= exact {
+            return x;
         }
-        x = next;
+        x = if next > from && next < to { next } else { 0.5 * (from + to) };
     }
     x
 }
