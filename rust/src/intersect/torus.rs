@@ -45,7 +45,9 @@ impl Arc {
 
     /// Where rays that are in the box around the ring from `start` to `end` are inside, from the eye on: stretches, and
     /// how many of them any ray has. A ray that has fewer has from 0 to `NEAREST`.
-    #[inline(always)]
+    ///
+    /// One ray after the other, so no instruction set would do it faster; and out of the way of what is cast more often.
+    #[inline(never)]
     pub fn cross(
         &self,
         direction: &[Lanes; 3],
@@ -142,7 +144,7 @@ impl Arc {
     }
 
     /// Unit normals, turned towards the eye, at all points that are left in `nearness`.
-    #[inline(always)]
+    #[inline(never)]
     pub fn normals(&self, direction: &[Lanes; 3], mut nearness: Lanes, normals: &mut [Lanes; 3]) {
         if self.ring.span != Span::Whole {
             for plane in &self.ends {
