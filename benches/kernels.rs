@@ -117,7 +117,7 @@ fn samples(group: &mut Group) {
         let mut index = 0;
         b.iter(|| {
             index += 1;
-            sample(&config, 0, index % 64, arrays.slots().remove(0))
+            sample(&config, 0, index % 64, None, arrays.slots().remove(0))
         });
     });
 }
@@ -128,7 +128,9 @@ fn batches(group: &mut Group) {
     for threads in [1, 2] {
         let pool = pool(threads);
         group.bench_function(format!("{threads} threads"), |b| {
-            b.iter(|| pool.install(|| batch(&config, 0, 0, arrays.slots(), &Watch::default())).unwrap());
+            b.iter(|| {
+                pool.install(|| batch(&config, 0, 0, None, arrays.slots(), &Watch::default())).unwrap()
+            });
         });
     }
 }

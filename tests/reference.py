@@ -8,8 +8,9 @@ import numpy as np
 from hypothesis import strategies as st
 from scipy import ndimage
 
+import reference_slanted
 from sketchcore.camera import Camera
-from sketchcore.shape import Cuboid, Cylinder, Shape, Wedge
+from sketchcore.shape import Cuboid, Cylinder, Frustum, Shape, Torus, Wedge
 
 SIDE = 64
 IMAGE = 256
@@ -32,7 +33,8 @@ def primitives():
     op = st.sampled_from(["add", "add", "subtract"])
     axis, corner = st.sampled_from("xyz"), st.tuples(*[st.sampled_from([-1, 1])] * 2)
     cuboid = st.builds(Cuboid, center, half, op)
-    return cuboid | st.builds(Cylinder, center, half, axis, op) | st.builds(Wedge, center, half, axis, corner, op)
+    plain = cuboid | st.builds(Cylinder, center, half, axis, op) | st.builds(Wedge, center, half, axis, corner, op)
+    return plain | reference_slanted.primitives(op)
 
 
 def shapes(most=6):
@@ -78,6 +80,8 @@ def holds(primitive, points):
         return within.all(axis=-1)
     axis = "xyz".index(primitive.axis)
     across = [a for a in range(3) if a != axis]
+    if isinstance(primitive, Frustum | Torus):
+        return reference_slanted.holds(primitive, points)
     if isinstance(primitive, Wedge):
         # The section's corners lie at (1, 1) and (-1, -1) as seen from the right angle: the diagonal is in between.
         return within.all(axis=-1) & ((parts[..., across] * primitive.corner).sum(axis=-1) >= 0.0)
@@ -124,6 +128,9 @@ def _crossings(shape, origin, rays):
     with np.errstate(divide="ignore", invalid="ignore"):
         for primitive in shape.primitives:
             center, half = np.array(primitive.center), np.array(primitive.half)
+            if isinstance(primitive, Frustum | Torus):
+                depths += reference_slanted.crossings(primitive, origin - center, rays)
+                continue
             flat, across = range(3), []
             if isinstance(primitive, Cylinder):
                 flat = ["xyz".index(primitive.axis)]
@@ -170,6 +177,9 @@ def normals(shape, camera, hits):
     t = np.where(seen, hits, 1.0)[..., None]
     result = []
     for primitive in shape.primitives:
+        if isinstance(primitive, Frustum | Torus):
+            result.append(_nearest_normal(primitive, camera, rays, t, seen))
+            continue
         center, half = np.array(primitive.center), np.array(primitive.half)
         before, behind = (holds(primitive, camera.position + rays * (t + d)) for d in (-1e-7, 1e-7))
         at = camera.position + rays * t - center
@@ -195,6 +205,26 @@ def normals(shape, camera, hits):
         away = (normal * rays).sum(axis=-1) > 0
         result.append(np.where(away[..., None], -normal, normal))
     return result
+
+
+def _nearest_normal(primitive, camera, rays, t, seen):
+    """The normal of the nearest surface of a frustum or a torus, where a step along the ray enters or leaves it."""
+    before, behind = (holds(primitive, camera.position + rays * (t + d)) for d in (-1e-7, 1e-7))
+    at = camera.position + rays * t - np.array(primitive.center)
+    step = 1e-6
+    # Each field is 0 on one surface: over the length of its gradient it is the distance.
+    values = reference_slanted.fields(primitive, at)
+    slopes = [
+        (reference_slanted.fields(primitive, at + e) - reference_slanted.fields(primitive, at - e)) / (2 * step)
+        for e in step * np.eye(3)
+    ]
+    gradients = np.stack(slopes, axis=-1)
+    lengths = np.linalg.norm(gradients, axis=-1)
+    nearest = (np.abs(values) / np.maximum(lengths, 1e-12)).argmin(axis=0)[None]
+    normal = np.take_along_axis(gradients / np.maximum(lengths, 1e-12)[..., None], nearest[..., None], axis=0)[0]
+    normal[(before == behind) | ~seen] = 0.0
+    away = (normal * rays).sum(axis=-1) > 0
+    return np.where(away[..., None], -normal, normal)
 
 
 def frustum(shape, camera, rays):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 from typer.testing import CliRunner
 
@@ -71,6 +72,34 @@ def test_generate_writes_samples(tmp_path: Path) -> None:
         assert sk.Shape.from_json(str(sample["shape"])) == batch.shapes[0]
     with Image.open(tmp_path / "data" / "000000011-1.png") as image:
         np.testing.assert_array_equal(255 - np.asarray(image), batch.drawings[0, 1])
+
+
+def test_generate_takes_a_grammar(tmp_path: Path) -> None:
+    bottles = EXAMPLES / "bottles.py"
+    run("generate", "-o", tmp_path / "bottles", "--count", 2, "--seed", 4, "--grammar", bottles)
+    batch = sk.generate(4, 2, grammar=str(bottles))
+    with np.load(tmp_path / "bottles" / "000000001.npz") as sample:
+        np.testing.assert_array_equal(sample["drawings"], batch.drawings[1])
+    unknown = run("generate", "-o", tmp_path / "none", "--grammar", "tabel", ok=False)
+    assert "one of chair, vase" in unknown
+    assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.parametrize("suffix", ["obj", "glb", "ply", "stl"])
+def test_generate_writes_meshes(tmp_path: Path, suffix: str) -> None:
+    pytest.importorskip("manifold3d")
+    chosen = ["--grammar", "chair", "--seed", 5, "--first", 7, "--format", suffix]
+    run("generate", "-o", tmp_path / "chairs", "--meshes", 3, *chosen)
+    names = [f"00000000{i}.{suffix}" for i in (7, 8, 9)]
+    assert sorted(path.name for path in (tmp_path / "chairs").iterdir()) == names
+    read = trimesh.load(tmp_path / "chairs" / names[1], force="mesh")
+    read.merge_vertices()  # STL knows no shared ones
+    expected = sk.generate(5, 1, first=8, grammar="chair").shapes[0].to_mesh()
+    assert read.is_watertight
+    assert read.volume == pytest.approx(expected.volume, rel=1e-3)
+    assert "meshes are written as obj, glb, ply, stl" in run(
+        "generate", "-o", tmp_path / "other", "--meshes", 1, "--format", "off", ok=False
+    )
 
 
 def test_evaluate_reports_as_json_and_plots(tmp_path: Path) -> None:

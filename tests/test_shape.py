@@ -79,14 +79,14 @@ def test_numbers_of_any_kind_become_floats():
         (lambda: Wedge((0, 0, 0), (1, 0, 1)), ValueError, "half sizes must be more than 0"),
         (lambda: Wedge((0, 0, 0), (1, 1, 1), op="remove"), ValueError, "'add' or 'subtract', got 'remove'"),
         (lambda: Shape([]), ValueError, "at least one primitive"),
-        (lambda: Shape([BOX, "box"]), TypeError, "made of Cuboid, Cylinder and Wedge, got str"),
+        (lambda: Shape([BOX, "box"]), TypeError, "made of Cuboid, Cylinder and Wedge, Frustum and Torus; got str"),
         (lambda: Shape.from_json("{"), ValueError, "Expecting property name"),
         (lambda: Shape.from_json("[]"), ValueError, '"primitives"'),
         (lambda: Shape.from_json('{"primitives": []}'), ValueError, "at least one primitive"),
         (
             lambda: Shape.from_json({"primitives": [{"kind": "cone"}]}),
             ValueError,
-            "primitive 0 has kind 'cone'; the kinds are 'cuboid', 'cylinder' and 'wedge'",
+            "primitive 0 has kind 'cone'; the kinds are 'cuboid', 'cylinder', 'wedge', 'frustum' and 'torus'",
         ),
         (
             lambda: Shape.from_json(

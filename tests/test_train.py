@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from sketchcore.train import PRESETS, Run, train
 from sketchcore.train.chains import ChainStage, start_chain
 from sketchcore.train.checkpoint import load_checkpoint
 from sketchcore.train.optimizers import FilterMuon, make_optimizers
+from sketchcore.train.presets import grammar_changes
 
 TINY = {"stem": 8, "image": (16, 16, 16), "features": 8, "fused": 8, "world": (8, 16, 16), "groups": 2}
 
@@ -212,6 +214,29 @@ def test_a_chain_is_a_function_of_seed_and_index() -> None:
     chains = [start_chain(preset, 5, i) for i in range(30)]
     assert {len(c.sketches) for c in chains} == {1, 2, 3, 4}
     assert {c.length for c in chains} == {1, 2, 3}
+
+
+@pytest.mark.parametrize("name", ["chair", "vase"])
+def test_the_presets_of_classes_train_on_their_shapes(tmp_path: Path, name: str) -> None:
+    preset = PRESETS[name]
+    chain = start_chain(preset, 5, 9)
+    expected = sk.generate(5, 1, first=9, views=len(chain.sketches), config=preset.generator, grammar=name)
+    np.testing.assert_array_equal(chain.truth, expected.world[0, :, :, 32:])
+    np.testing.assert_array_equal(chain.sketches.drawings, expected.drawings[0])
+    train(replace(tiny(tmp_path, steps=1), preset=name), quiet=True)
+    config = json.loads((tmp_path / "weights.json").read_text())
+    assert config["training"]["grammar"] == name
+    assert "grammar" not in config["training"]["generator"]
+
+
+def test_any_preset_trains_on_another_grammars_shapes() -> None:
+    changes = grammar_changes("gpu", "vase")
+    preset = replace(PRESETS["gpu"], **changes)
+    assert preset.grammar == "vase"
+    assert preset.generator == PRESETS["vase"].generator
+    assert grammar_changes("gpu", None) == {}
+    with pytest.raises(ValueError, match="unknown grammar 'jar'"):
+        grammar_changes("gpu", "jar")
 
 
 def test_wrong_runs_say_what_would_be_right(tmp_path: Path) -> None:

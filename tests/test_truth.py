@@ -22,7 +22,9 @@ def batch_of(shape: sk.Shape) -> Batch:
 
 def mirrored(shape: sk.Shape) -> sk.Shape:
     """The shape and its mirror image about z = 0, each primitive beside its own."""
-    other = sk.Shape.from_packed(shape.packed * np.array([1, 1, 1, 1, -1, 1, 1, 1.0]))
+    rows = shape.packed.copy()
+    rows[:, 4] *= -1
+    other = sk.Shape.from_packed(rows)
     return sk.Shape([p for pair in zip(shape.primitives, other.primitives, strict=True) for p in pair])
 
 

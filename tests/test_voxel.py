@@ -6,7 +6,7 @@ from hypothesis import given, settings
 
 import reference
 from sketchcore.grids import voxelize
-from sketchcore.shape import Cuboid, Cylinder, Shape, Wedge
+from sketchcore.shape import Cuboid, Cylinder, Frustum, Shape, Torus, Wedge
 
 
 @settings(max_examples=60)
@@ -86,6 +86,12 @@ def test_the_mirror_image_of_a_primitive_is_its_voxels_mirrored(primitive):
     changes = {"center": (*primitive.center[:2], -primitive.center[2]), "op": "add"}
     if isinstance(primitive, Wedge) and primitive.axis != "z":
         changes["corner"] = (primitive.corner[0], -primitive.corner[1])
+    if isinstance(primitive, Frustum) and primitive.axis != "z":
+        changes["shear"] = (primitive.shear[0], -primitive.shear[1])
+    if isinstance(primitive, Frustum) and primitive.axis == "z":
+        changes |= {"shear": tuple(-s for s in primitive.shear), "taper": tuple(-t for t in primitive.taper)}
+    if isinstance(primitive, Torus) and primitive.axis != "z":
+        changes["arc"] = (-primitive.arc[1], -primitive.arc[0])
     mirrored = voxelize(Shape([replace(primitive, **changes)]))
     np.testing.assert_array_equal(mirrored, voxelize(Shape([replace(primitive, op="add")]))[..., ::-1])
 

@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, Any
 
 from sketchcore.camera import QUARTER_VIEWS, VIEWPOINTS, Camera
 from sketchcore.datagen.generate import Batch, generate
+from sketchcore.datagen.grammars import GRAMMARS, Grammar, find_grammar
 from sketchcore.grids import (
     LINES,
     buffers,
@@ -41,7 +42,7 @@ from sketchcore.grids import (
     voxelize,
 )
 from sketchcore.linestyle import STYLES, LineStyle
-from sketchcore.shape import Cuboid, Cylinder, Shape, Wedge
+from sketchcore.shape import Cuboid, Cylinder, Frustum, Shape, Torus, Wedge
 from sketchcore.volume import iou
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
 __version__ = version("sketchcore")
 
 __all__ = [
+    "GRAMMARS",
     "LINES",
     "QUARTER_VIEWS",
     "STYLES",
@@ -60,14 +62,18 @@ __all__ = [
     "Camera",
     "Cuboid",
     "Cylinder",
+    "Frustum",
+    "Grammar",
     "LineStyle",
     "Reconstruction",
     "Shape",
+    "Torus",
     "Wedge",
     "buffers",
     "carve",
     "datasets",
     "draw",
+    "find_grammar",
     "frustum",
     "generate",
     "iou",

@@ -1,6 +1,6 @@
 """The Rust kernels. Arrays are C-contiguous; cameras and shapes are packed (`Camera.packed`, `Shape.packed`)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ __all__ = [
     "draw_kinds",
     "evidence",
     "evidence_fields",
+    "fit",
     "frustum",
     "generate",
     "hidden_lines",
@@ -83,6 +84,9 @@ def lift(features: NDArray[np.float32], cameras: NDArray[np.float64]) -> NDArray
 def lift_transposed(gradient: NDArray[np.float32], cameras: NDArray[np.float64]) -> NDArray[np.float32]: ...
 def lift_taps(cameras: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float32]]: ...
 def default_config() -> str: ...
+def fit(
+    shape: NDArray[np.float64], cover: float, min_occupancy: float, min_extent: int
+) -> NDArray[np.float64] | None: ...
 def generate(
     config: str,
     seed: int,
@@ -92,6 +96,7 @@ def generate(
     world: NDArray[np.uint8],
     frusta: NDArray[np.uint8],
     progress: Callable[[int], object] | None = None,
+    shapes: Sequence[NDArray[np.float64]] | None = None,
 ) -> tuple[list[NDArray[np.float64]], NDArray[np.float64]]: ...
 def bilateral(
     vertices: NDArray[np.float64],

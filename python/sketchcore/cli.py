@@ -23,6 +23,10 @@ app = typer.Typer(
 _console = Console()
 
 Json = Annotated[bool, typer.Option("--json", help="Print plain JSON instead of a table.")]
+Grammar = Annotated[
+    str | None,
+    typer.Option("--grammar", help="What shapes are of: chair, vase, or a Python file with a grammar; else abstract."),
+]
 Model = Annotated[Path | None, typer.Option("--model", help="Weights to use instead of those in the package.")]
 
 
@@ -99,17 +103,29 @@ def generate(
     first: Annotated[int, typer.Option(help="Index of the first sample.")] = 0,
     views: Annotated[int, typer.Option(help="Drawings a sample, 1 to 13.")] = 1,
     config: Annotated[Path | None, typer.Option(help="JSON file of what differs from the default config.")] = None,
+    grammar: Grammar = None,
+    meshes: Annotated[
+        int | None, typer.Option(help="Write so many shapes as meshes instead, and nothing else; of a grammar's.")
+    ] = None,
+    suffix: Annotated[str, typer.Option("--format", help="Of meshes: obj, glb, ply, stl.")] = "obj",
 ) -> None:
     """Write synthetic samples as files: INDEX.npz (drawings, world, frusta, cameras, shape) and INDEX-VIEW.png.
 
-    Training needs no files: see `sketchcore train` and `sketchcore.datasets.Generated`.
+    Or shapes as meshes: INDEX.obj. Training needs no files: see `sketchcore train` and `sketchcore.datasets.Generated`.
     """
     with _errors():
-        from sketchcore.datagen.files import write_samples
+        from sketchcore.datagen.files import write_meshes, write_samples
 
         settings = json.loads(config.read_text()) if config else None
-        with _bar("samples", count) as show:
-            write_samples(out, seed, count, first=first, views=views, config=settings, progress=show)
+        with _bar("samples" if meshes is None else "meshes", meshes or count) as show:
+            if meshes is None:
+                write_samples(
+                    out, seed, count, first=first, views=views, config=settings, grammar=grammar, progress=show
+                )
+            else:
+                write_meshes(
+                    out, seed, meshes, first=first, config=settings, grammar=grammar, suffix=suffix, progress=show
+                )
 
 
 @app.command()
@@ -120,7 +136,8 @@ def train(
         typer.Option(
             help="compact; laptop (one hour on two cores) or gpu (25 minutes on a GPU), which are compact as well; "
             "paper (the paper's networks and procedure); and alternatives to compact on the same samples, by the same "
-            "optimisers: fractional and distance (other truths), paper-matched and multiscale (other networks)."
+            "optimisers: fractional and distance (other truths), paper-matched and multiscale (other networks); chair "
+            "and vase, compact on shapes of those grammars."
         ),
     ] = "compact",
     minutes: Annotated[float | None, typer.Option(help="Time for this run; laptop and gpu know theirs.")] = None,
@@ -130,6 +147,7 @@ def train(
     begin: Annotated[
         Path | None, typer.Option("--from", help="Weights to begin with, of the preset's network; else random ones.")
     ] = None,
+    grammar: Grammar = None,
     device: Annotated[str | None, typer.Option(help="cpu or cuda; the default is the best there is.")] = None,
     as_json: Json = False,
 ) -> None:
@@ -139,8 +157,9 @@ def train(
 
         from sketchcore.train import Run
         from sketchcore.train import train as run_training
+        from sketchcore.train.presets import grammar_changes
 
-        run = Run(out, preset, minutes, steps, seed, device, begin=begin)
+        run = Run(out, preset, minutes, steps, seed, device, begin=begin, changes=grammar_changes(preset, grammar))
         try:
             stages = run_training(run, resume=resume, quiet=as_json)
         except KeyboardInterrupt:

@@ -10,7 +10,7 @@ use crate::pen::{PenConfig, redraw};
 use crate::random::Random;
 use crate::stroke;
 use crate::style::StyleConfig;
-use crate::voxel::CELLS;
+use crate::voxel::{BitGrid, CELLS};
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -161,15 +161,19 @@ const PEN: u64 = 2;
 const FREE: u64 = 16;
 const STYLE: u64 = 32;
 
-/// Makes sample `index`, of as many views as `slot` has room for.
+/// Makes sample `index`, of as many views as `slot` has room for; of a shape of the grammar, or of the one that is given.
 pub fn sample(
     config: &SampleConfig,
     seed: u64,
     index: u64,
+    given: Option<&Shape>,
     slot: Slot,
 ) -> Result<(Shape, Vec<Camera>), CoreError> {
     let views = slot.drawings.len() / (IMAGE * IMAGE);
-    let (shape, grid) = config.grammar.draw(&mut Random::new(seed, index, SHAPE))?;
+    let (shape, grid) = match given {
+        Some(shape) => (shape.clone(), BitGrid::of_shape(shape)),
+        None => config.grammar.draw(&mut Random::new(seed, index, SHAPE))?,
+    };
     grid.write_bytes(slot.world);
     let free = |v: usize| Random::new(seed, index, FREE + v as u64);
     let cameras = draw_cameras(config, &shape, views, &mut Random::new(seed, index, CAMERAS), free);
@@ -231,11 +235,13 @@ impl Watch {
     }
 }
 
-/// Makes samples `first ..`, one a slot, on the threads of the current rayon pool.
+/// Makes samples `first ..`, one a slot, on the threads of the current rayon pool; of shapes of the grammar, or of those
+/// that are given, as many as there are slots.
 pub fn batch(
     config: &SampleConfig,
     seed: u64,
     first: u64,
+    given: Option<&[Shape]>,
     slots: Vec<Slot>,
     watch: &Watch,
 ) -> Result<Vec<(Shape, Vec<Camera>)>, CoreError> {
@@ -248,7 +254,7 @@ pub fn batch(
             if watch.stopped.load(Relaxed) {
                 return Err(CoreError::Stopped);
             }
-            let made = sample(config, seed, first.wrapping_add(i as u64), slot)?;
+            let made = sample(config, seed, first.wrapping_add(i as u64), given.map(|g| &g[i]), slot)?;
             watch.finished.fetch_add(1, Relaxed);
             Ok(made)
         })
@@ -359,7 +365,7 @@ mod tests {
         let mut drawings = vec![0; views * IMAGE * IMAGE];
         let (mut world, mut frusta) = (vec![0; CELLS], vec![0; views * CELLS]);
         let slot = Slot { drawings: &mut drawings, world: &mut world, frusta: &mut frusta };
-        let (_, cameras) = sample(config, 3, index, slot).unwrap();
+        let (_, cameras) = sample(config, 3, index, None, slot).unwrap();
         (drawings, frusta, cameras)
     }
 
@@ -393,7 +399,7 @@ mod tests {
         let mut arrays = vec![(vec![0; IMAGE * IMAGE], vec![0; CELLS], vec![0; CELLS]); 3];
         let mut run = |watch: &Watch| {
             let slots = arrays.iter_mut().map(|(drawings, world, frusta)| Slot { drawings, world, frusta });
-            batch(&SampleConfig::default(), 3, 0, slots.collect(), watch)
+            batch(&SampleConfig::default(), 3, 0, None, slots.collect(), watch)
         };
         let watch = Watch::default();
         assert_eq!(run(&watch).unwrap().len(), 3);

@@ -270,7 +270,7 @@ impl Shares {
 mod tests {
     use super::*;
     use crate::camera::VIEWPOINTS;
-    use crate::csg::{Kind, Primitive};
+    use crate::csg::{Frustum, Kind, Primitive, Torus};
     use crate::grammar::GrammarConfig;
     use crate::random::Random;
     use glam::DVec3;
@@ -317,11 +317,26 @@ mod tests {
         }
     }
 
+    /// A slanted leg, a cone on its point, an arc, and a ring taken away, among others.
+    fn with_all_kinds(shape: &Shape) -> Shape {
+        let frustum =
+            |round, taper| Kind::Frustum(Frustum { axis: 1, round, shear: [0.1, -0.05], taper: [taper; 2] });
+        let torus = |tube, arc| Kind::Torus(Torus { axis: 2, tube, arc });
+        let kinds =
+            [frustum(false, 0.3), frustum(true, 1.0), torus(0.2, [30.0, 290.0]), torus(0.3, [0.0, 360.0])];
+        let more = kinds.into_iter().enumerate().map(|(i, kind)| {
+            let half = DVec3::new(0.2, 0.15, 0.1) * (1.0 + 0.3 * i as f64);
+            Primitive { kind, additive: i < 3, center: DVec3::splat(0.1 - 0.05 * i as f64), half }
+        });
+        Shape::new(shape.primitives().iter().copied().chain(more).collect()).unwrap()
+    }
+
     #[test]
     fn every_instruction_set_sees_the_same() {
         let grammar = GrammarConfig { wedges: 0.2, ..GrammarConfig::default() };
         for (i, (azimuth, elevation)) in (0..).zip(VIEWPOINTS) {
             let (shape, _) = grammar.draw(&mut Random::new(5, i, 0)).unwrap();
+            let shape = if i % 2 == 0 { with_all_kinds(&shape) } else { shape };
             let camera = Camera::orbit(azimuth, elevation, 0.0, 2.0);
             let caster = RayCaster::new(&shape, &camera).unwrap();
             let best = Buffers::of_shape(&shape, &camera, 100).unwrap();

@@ -1,22 +1,34 @@
-//! Solid shapes: cuboids, cylinders and wedges in order, the last one that contains a point decides.
+//! Solid shapes: primitives in order, the last one that contains a point decides.
 
 use crate::error::CoreError;
 use glam::DVec3;
 
+mod frustum;
+mod torus;
+pub use frustum::{Frustum, Slopes};
+pub use torus::{Ring, Span, Torus};
+
 /// What a primitive is. A cylinder lies along a world axis (0, 1, 2 for x, y, z); its section may be an ellipse.
 /// A wedge is half of a cuboid, cut along a diagonal of its section across `axis`; `corner` has the signs, along
 /// the two cross axes, of the corner that stays: the one with the right angle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     Cuboid,
     Cylinder { axis: usize },
     Wedge { axis: usize, corner: [i8; 2] },
+    Frustum(Frustum),
+    Torus(Torus),
 }
 
+/// Numbers that every packed row has, and those that rows of shapes with a frustum or a torus have.
+pub const NARROW: usize = 8;
+pub const WIDE: usize = 12;
+
 impl Kind {
-    /// The kind that a packed row's first number stands for.
-    pub fn from_code(code: f64) -> Option<Self> {
+    /// The kind that a packed row's first number stands for, and its last four where it has them.
+    pub fn from_code(code: f64, more: [f64; 4]) -> Option<Self> {
         let n = code as usize;
+        let [a, b, c, d] = more;
         match n {
             _ if n as f64 != code => None,
             0 => Some(Kind::Cuboid),
@@ -25,25 +37,40 @@ impl Kind {
                 let corner = [n & 1, n >> 1 & 1].map(|bit| 2 * bit as i8 - 1);
                 Some(Kind::Wedge { axis: n / 4 - 1, corner })
             }
+            16..=21 => {
+                let (axis, round) = ((n - 16) % 3, n >= 19);
+                Some(Kind::Frustum(Frustum { axis, round, shear: [a, b], taper: [c, d] }))
+            }
+            22..=24 => Some(Kind::Torus(Torus { axis: n - 22, tube: a, arc: [b, c] })),
             _ => None,
         }
     }
 
     /// 0 for a cuboid, 1 + axis for a cylinder; 4 + 4 axis for a wedge, 1 and 2 more where its corner lies on the
-    /// positive side of the first and the second cross axis.
-    pub fn code(self) -> f64 {
-        let n = match self {
-            Kind::Cuboid => 0,
-            Kind::Cylinder { axis } => 1 + axis,
+    /// positive side of the first and the second cross axis; 16 + axis for a frustum, 19 + axis for a round one;
+    /// 22 + axis for a torus. And the numbers that only some kinds have: shear and taper; or tube and arc.
+    pub fn code(self) -> (f64, [f64; 4]) {
+        let (n, more) = match self {
+            Kind::Cuboid => (0, [0.0; 4]),
+            Kind::Cylinder { axis } => (1 + axis, [0.0; 4]),
             Kind::Wedge { axis, corner: [u, v] } => {
-                4 + 4 * axis + usize::from(u > 0) + 2 * usize::from(v > 0)
+                (4 + 4 * axis + usize::from(u > 0) + 2 * usize::from(v > 0), [0.0; 4])
             }
+            Kind::Frustum(Frustum { axis, round, shear, taper }) => {
+                (16 + 3 * usize::from(round) + axis, [shear[0], shear[1], taper[0], taper[1]])
+            }
+            Kind::Torus(Torus { axis, tube, arc }) => (22 + axis, [tube, arc[0], arc[1], 0.0]),
         };
-        n as f64
+        (n as f64, more)
+    }
+
+    /// Whether its row needs no more than the first numbers.
+    fn is_narrow(self) -> bool {
+        !matches!(self, Kind::Frustum(_) | Kind::Torus(_))
     }
 }
 
-/// One cuboid, cylinder or wedge, added to what came before it or subtracted from it.
+/// One solid, added to what came before it or subtracted from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Primitive {
     pub kind: Kind,
@@ -69,20 +96,50 @@ impl Primitive {
                 let (a, b) = (d[u] / self.half[u], d[v] / self.half[v]);
                 within.all() && f64::from(corner[0]) * a + f64::from(corner[1]) * b >= 0.0
             }
+            Kind::Frustum(frustum) => {
+                let (u, v) = cross_axes(frustum.axis);
+                frustum.slopes(self.half).hold(frustum.round, [d[u], d[v], d[frustum.axis]])
+            }
+            Kind::Torus(torus) => {
+                let (u, v) = cross_axes(torus.axis);
+                torus.ring(self.half).hold([d[u], d[v], d[torus.axis]])
+            }
         }
     }
 
     /// The mirror image about the plane z = 0.
     pub fn mirrored(mut self) -> Self {
         self.center.z = -self.center.z;
-        if let Kind::Wedge { axis: 0 | 1, corner: [_, z] } = &mut self.kind {
-            *z = -*z;
+        match &mut self.kind {
+            Kind::Wedge { axis: 0 | 1, corner: [_, z] } => *z = -*z,
+            Kind::Frustum(frustum) => *frustum = frustum.mirrored(),
+            Kind::Torus(torus) => *torus = torus.mirrored(),
+            _ => {}
         }
         self
     }
+
+    /// Lower and upper corner of a box around it.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let (lo, hi) = match self.kind {
+            Kind::Frustum(frustum) => frustum.corners(self.half),
+            Kind::Torus(torus) => torus.corners(self.half),
+            _ => (-self.half, self.half),
+        };
+        (self.center + lo, self.center + hi)
+    }
+
+    fn fault(&self) -> Option<&'static str> {
+        match self.kind {
+            Kind::Frustum(frustum) => frustum.fault(),
+            Kind::Torus(torus) => torus.fault(),
+            _ => None,
+        }
+    }
 }
 
-/// The two axes across a cylinder's or a wedge's own, in order.
+/// The two axes across a primitive's own, in order.
+#[inline(always)]
 pub fn cross_axes(axis: usize) -> (usize, usize) {
     match axis {
         0 => (1, 2),
@@ -110,14 +167,23 @@ impl Shape {
                 let half = p.half.to_array();
                 return Err(CoreError::ZeroSize { index, half });
             }
+            if let Some(fault) = p.fault() {
+                return Err(CoreError::BadPrimitive { index, fault });
+            }
         }
         Ok(Self { primitives })
     }
 
-    /// From rows of eight numbers: kind (see `Kind::code`), op (1 adds, 0 subtracts), center, half.
-    pub fn from_rows(rows: &[[f64; 8]]) -> Result<Self, CoreError> {
+    /// From rows of eight numbers: kind, op (1 adds, 0 subtracts), center, half; or of twelve (see `Kind::code`).
+    pub fn from_rows<const N: usize>(rows: &[[f64; N]]) -> Result<Self, CoreError> {
+        const { assert!(N == NARROW || N == WIDE) };
         let primitives = rows.iter().enumerate().map(|(index, row)| {
-            let kind = Kind::from_code(row[0]).ok_or(CoreError::UnknownKind { index, kind: row[0] })?;
+            let more = row[NARROW..].first_chunk();
+            let kind = Kind::from_code(row[0], *more.unwrap_or(&[f64::NAN; 4]))
+                .ok_or(CoreError::UnknownKind { index, kind: row[0] })?;
+            if N == NARROW && !kind.is_narrow() {
+                return Err(CoreError::ShortRow { index });
+            }
             let additive = match row[1] {
                 0.0 => false,
                 1.0 => true,
@@ -133,13 +199,15 @@ impl Shape {
         Self::new(primitives.collect::<Result<_, _>>()?)
     }
 
-    /// The rows that `from_rows` reads.
-    pub fn to_rows(&self) -> Vec<[f64; 8]> {
+    /// The rows that `from_rows` reads, one after the other, and how long each is: as short as they can be.
+    pub fn to_rows(&self) -> (Vec<f64>, usize) {
+        let width = if self.primitives.iter().all(|p| p.kind.is_narrow()) { NARROW } else { WIDE };
         let row = |p: &Primitive| {
-            let (c, h) = (p.center, p.half);
-            [p.kind.code(), f64::from(u8::from(p.additive)), c.x, c.y, c.z, h.x, h.y, h.z]
+            let ((kind, [e, f, g, h]), center, half) = (p.kind.code(), p.center, p.half);
+            let op = f64::from(u8::from(p.additive));
+            [kind, op, center.x, center.y, center.z, half.x, half.y, half.z, e, f, g, h]
         };
-        self.primitives.iter().map(row).collect()
+        (self.primitives.iter().flat_map(|p| row(p).into_iter().take(width)).collect(), width)
     }
 
     pub fn primitives(&self) -> &[Primitive] {
@@ -157,7 +225,8 @@ impl Shape {
         self.primitives
             .iter()
             .filter(|p| p.additive)
-            .fold(none, |(lo, hi), p| (lo.min(p.center - p.half), hi.max(p.center + p.half)))
+            .map(Primitive::bounds)
+            .fold(none, |(lo, hi), (low, high)| (lo.min(low), hi.max(high)))
     }
 
     /// The shape moved by `-origin` and then scaled.
@@ -165,16 +234,37 @@ impl Shape {
         for p in &mut self.primitives {
             p.center = (p.center - origin) * scale;
             p.half *= scale;
+            if let Kind::Frustum(frustum) = &mut p.kind {
+                frustum.shear = frustum.shear.map(|s| s * scale);
+            }
         }
         self
     }
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
+    use proptest::prelude::*;
 
-    pub fn cuboid(center: [f64; 3], half: [f64; 3], additive: bool) -> Primitive {
+    /// Every kind, and frusta and tori with the limits of what they can be.
+    pub fn any_kind() -> impl Strategy<Value = Kind> {
+        let taper = || prop_oneof![-1.0..1.0, Just(0.0), Just(1.0), Just(-1.0)];
+        let frustum = (0..3usize, any::<bool>(), [-0.3..0.3, -0.3..0.3], [taper(), taper()]).prop_map(
+            |(axis, round, shear, [u, v])| {
+                let taper = if round { [u, u] } else { [u, v] };
+                Kind::Frustum(Frustum { axis, round, shear, taper })
+            },
+        );
+        let turn = prop_oneof![10.0..360.0, Just(180.0), Just(360.0)];
+        let tube = prop_oneof![0.05..0.5, Just(0.5)];
+        let torus = (0..3usize, tube, -180.0..180.0, turn)
+            .prop_map(|(axis, tube, from, turn)| Kind::Torus(Torus { axis, tube, arc: [from, from + turn] }));
+        let plain = (0..16u8).prop_map(|n| Kind::from_code(n.into(), [0.0; 4]).unwrap());
+        prop_oneof![plain, frustum, torus]
+    }
+
+    fn cuboid(center: [f64; 3], half: [f64; 3], additive: bool) -> Primitive {
         Primitive { kind: Kind::Cuboid, additive, center: center.into(), half: half.into() }
     }
 
@@ -195,10 +285,10 @@ mod tests {
     #[test]
     fn rows_round_trip_and_bad_rows_are_refused() {
         let rows = [[0.0, 1.0, 0.1, 0.2, 0.3, 0.1, 0.1, 0.1], [3.0, 0.0, 0.0, 0.0, 0.0, 0.2, 0.1, 0.3]];
-        assert_eq!(Shape::from_rows(&rows).unwrap().to_rows(), rows);
-        assert_eq!(Shape::from_rows(&[]), Err(CoreError::NoPrimitives));
+        assert_eq!(Shape::from_rows(&rows).unwrap().to_rows(), (rows.as_flattened().to_vec(), NARROW));
+        assert_eq!(Shape::from_rows::<NARROW>(&[]), Err(CoreError::NoPrimitives));
         let mut bad = rows;
-        for kind in [16.0, 4.5, -1.0, f64::NAN] {
+        for kind in [25.0, 4.5, -1.0, f64::NAN] {
             bad[1][0] = kind;
             assert!(matches!(Shape::from_rows(&bad), Err(CoreError::UnknownKind { index: 1, .. })));
         }
@@ -211,10 +301,15 @@ mod tests {
 
     #[test]
     fn kinds_round_trip_through_their_codes() {
-        for n in 0..16 {
-            assert_eq!(Kind::from_code(f64::from(n)).unwrap().code(), f64::from(n));
+        for n in 0..25 {
+            let more = match n {
+                0..16 => [0.0; 4],
+                16..22 => [0.1, 0.2, 0.3, 0.4],
+                _ => [0.2, 30.0, 90.0, 0.0],
+            };
+            assert_eq!(Kind::from_code(f64::from(n), more).unwrap().code(), (f64::from(n), more));
         }
-        assert_eq!(Kind::from_code(10.0), Some(Kind::Wedge { axis: 1, corner: [-1, 1] }));
+        assert_eq!(Kind::from_code(10.0, [0.0; 4]), Some(Kind::Wedge { axis: 1, corner: [-1, 1] }));
     }
 
     #[test]

@@ -15,9 +15,13 @@ pub enum CoreError {
     ZeroSize { index: usize, half: [f64; 3] },
     #[error(
         "primitive {index} has kind {kind}; 0 is a cuboid, 1, 2, 3 a cylinder along x, y, z, \
-         4 to 7, 8 to 11, 12 to 15 a wedge along them"
+         4 to 7, 8 to 11, 12 to 15 a wedge along them, 16, 17, 18 a frustum, 19, 20, 21 a round one, 22, 23, 24 a torus"
     )]
     UnknownKind { index: usize, kind: f64 },
+    #[error("primitive {index}: {fault}")]
+    BadPrimitive { index: usize, fault: &'static str },
+    #[error("primitive {index} is a frustum or a torus, whose row has 12 numbers; got 8")]
+    ShortRow { index: usize },
     #[error("primitive {index} has op {op}; 1 adds, 0 subtracts")]
     UnknownOp { index: usize, op: f64 },
     #[error("camera rotation must be orthonormal with determinant +1 (rows: right, down, forward)")]

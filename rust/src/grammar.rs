@@ -6,8 +6,9 @@
 
 use crate::csg::{Kind, Primitive, Shape, cross_axes};
 use crate::error::CoreError;
+use crate::fit::Fit;
 use crate::random::Random;
-use crate::voxel::{BitGrid, CELLS, SIDE};
+use crate::voxel::{BitGrid, SIDE};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -149,9 +150,11 @@ impl GrammarConfig {
 
     /// Draws shapes until one is acceptable: one piece, not empty, not dust.
     pub fn draw(&self, random: &mut Random) -> Result<(Shape, BitGrid), CoreError> {
+        let &Self { cover, min_occupancy, min_extent, .. } = self;
+        let fit = Fit { cover, min_occupancy, min_extent };
         for _ in 0..self.attempts {
             let grown = Shape::new(self.grow(random))?;
-            if let Some(accepted) = self.scale(grown) {
+            if let Some(accepted) = fit.fit(grown) {
                 return Ok(accepted);
             }
         }
@@ -254,31 +257,6 @@ impl GrammarConfig {
         };
         new.center[axis] += sign * (on.half[axis] + outwards);
     }
-
-    /// Centres and scales by the 120 % rule; `None` for what is empty, in pieces, or dust.
-    fn scale(&self, mut shape: Shape) -> Option<(Shape, BitGrid)> {
-        let (mut lo, mut hi) = shape.bounds();
-        // A cut may have taken away what reached furthest: then the bounds are those of the voxels left.
-        for _ in 0..4 {
-            let scale = 1.0 / (self.cover * (hi - lo).max_element());
-            shape = shape.moved(0.5 * (lo + hi), scale);
-            let expected = (hi - lo) * scale;
-            let grid = BitGrid::of_shape(&shape);
-            let bounds = grid.bounds()?;
-            let edge = |i: usize| i as f64 / SIDE as f64 - 0.5;
-            (lo, hi) = (DVec3::from(bounds.map(|b| edge(b.0))), DVec3::from(bounds.map(|b| edge(b.1 + 1))));
-            // Within a voxel of what was expected on either side, the exact bounds stand.
-            let tolerance = 2.0 / SIDE as f64;
-            if (expected - (hi - lo)).abs().max_element() <= tolerance {
-                let extents = bounds.map(|b| b.1 + 1 - b.0);
-                let acceptable = extents.iter().all(|&e| e >= self.min_extent)
-                    && f64::from(grid.count()) >= self.min_occupancy * CELLS as f64
-                    && grid.is_connected();
-                return acceptable.then_some((shape, grid));
-            }
-        }
-        None
-    }
 }
 
 /// How much of each side goes where four cut edges leave a hexagon, standing on an edge or on a corner, or an octagon.
@@ -321,6 +299,7 @@ fn beyond_slab(wedge: Primitive, thickness: f64) -> Primitive {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::voxel::CELLS;
 
     #[test]
     fn shapes_are_symmetric_connected_and_scaled() {

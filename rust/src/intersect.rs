@@ -10,6 +10,13 @@ use crate::camera::{Camera, IMAGE};
 use crate::csg::{Kind, Primitive, cross_axes};
 use glam::DVec3;
 
+mod frustum;
+mod plane;
+mod torus;
+use frustum::Cone;
+use plane::Plane;
+pub use torus::{Arc, STRETCHES};
+
 /// The nearness of points at the eye or behind it.
 pub const NEAREST: f64 = 1e8;
 /// Instead of a distance of 0, so that the eye may lie in the plane of a face.
@@ -29,8 +36,17 @@ pub struct Placed {
     origin: DVec3,
     /// For the lower and the upper face across each axis, 1 / its distance from the eye along the axis.
     faces: [[f64; 2]; 3],
+    curved: Curved,
     /// Image bounds: x from, x to, y from, y to, in [-1, 1] units of the image.
     pub bounds: [f64; 4],
+}
+
+/// What a frustum or a torus is bounded by, beside flat faces across an axis.
+enum Curved {
+    No,
+    Sides([Plane; 4]),
+    Cone(Cone),
+    Arc(Arc),
 }
 
 impl Placed {
@@ -40,11 +56,28 @@ impl Placed {
         // An eye in the plane of a face counts as between the two.
         let distances = |a: usize| [-half[a] - origin[a] - NO_DISTANCE, half[a] - origin[a] + NO_DISTANCE];
         let faces = [0, 1, 2].map(|a| distances(a).map(f64::recip));
-        Self { primitive: *primitive, origin, faces, bounds: image_bounds(primitive, camera) }
+        let curved = match primitive.kind {
+            Kind::Frustum(f) if f.round => Curved::Cone(Cone::new(&f.slopes(half), f.axis, origin)),
+            Kind::Frustum(f) => Curved::Sides(frustum::sides(&f.slopes(half), f.axis, origin)),
+            Kind::Torus(t) => Curved::Arc(Arc::new(&t, half, origin)),
+            _ => Curved::No,
+        };
+        Self { primitive: *primitive, origin, faces, curved, bounds: image_bounds(primitive, camera) }
+    }
+
+    /// The most stretches of a ray that can be inside it.
+    pub fn intervals(&self) -> usize {
+        if matches!(self.curved, Curved::Arc(_)) { STRETCHES } else { 1 }
+    }
+
+    /// A torus, which alone is crossed more than once.
+    #[inline(always)]
+    pub fn arc(&self) -> Option<&Arc> {
+        if let Curved::Arc(arc) = &self.curved { Some(arc) } else { None }
     }
 
     /// Where rays of these directions enter and leave the primitive: from one nearness to a lesser one; from 0 to `NEAREST`
-    /// if they miss it. Whether any meets it.
+    /// if they miss it. Whether any meets it. Of a torus, the box around it.
     #[inline(always)]
     pub fn cross(&self, direction: &[Lanes; 3], start: &mut Lanes, end: &mut Lanes) -> bool {
         (*start, *end) = ([NEAREST; RAYS], [0.0; RAYS]);
@@ -53,7 +86,12 @@ impl Placed {
         }
         let half = self.primitive.half;
         match self.primitive.kind {
-            Kind::Cuboid => {}
+            Kind::Cuboid | Kind::Torus(_) => {}
+            Kind::Frustum(_) => match &self.curved {
+                Curved::Sides(planes) => planes.iter().for_each(|plane| plane.clip(direction, start, end)),
+                Curved::Cone(cone) => cone.clip(direction, start, end),
+                _ => {}
+            },
             Kind::Cylinder { axis } => {
                 let (u, v) = cross_axes(axis);
                 let (iu, iv) = (1.0 / half[u], 1.0 / half[v]);
@@ -97,6 +135,9 @@ impl Placed {
     /// or slanted one.
     #[inline(always)]
     pub fn normals(&self, direction: &[Lanes; 3], mut nearness: Lanes, normals: &mut [Lanes; 3]) {
+        if let Curved::Arc(arc) = &self.curved {
+            return arc.normals(direction, nearness, normals);
+        }
         for axis in self.flat_axes() {
             let [low, high] = self.faces[axis];
             let normal = &mut normals[axis];
@@ -106,6 +147,13 @@ impl Placed {
                 normal[r] = if here { -1f64.copysign(d) } else { normal[r] };
                 nearness[r] = if here { 0.0 } else { at };
             }
+        }
+        match &self.curved {
+            Curved::Sides(planes) => {
+                planes.iter().for_each(|plane| plane.normals(direction, &mut nearness, normals));
+            }
+            Curved::Cone(cone) => cone.normals(direction, &nearness, normals),
+            _ => {}
         }
         let (Kind::Cylinder { axis } | Kind::Wedge { axis, .. }) = self.primitive.kind else { return };
         let (u, v) = cross_axes(axis);
@@ -133,6 +181,7 @@ impl Placed {
     fn flat_axes(&self) -> std::ops::Range<usize> {
         match self.primitive.kind {
             Kind::Cylinder { axis } => axis..axis + 1,
+            Kind::Frustum(frustum) => frustum.axis..frustum.axis + 1,
             _ => 0..3,
         }
     }
@@ -193,13 +242,10 @@ fn greater(a: f64, b: f64) -> f64 {
 fn image_bounds(primitive: &Primitive, camera: &Camera) -> [f64; 4] {
     let margin = 1e-6 / IMAGE as f64;
     let mut bounds = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
+    let (lo, hi) = primitive.bounds();
     for corner in 0..8 {
-        let sign = DVec3::new(
-            f64::from(corner & 1) * 2.0 - 1.0,
-            f64::from(corner >> 1 & 1) * 2.0 - 1.0,
-            f64::from(corner >> 2) * 2.0 - 1.0,
-        );
-        let p = camera.to_camera(primitive.center + primitive.half * sign);
+        let pick = |a: usize| if corner >> a & 1 == 0 { lo[a] } else { hi[a] };
+        let p = camera.to_camera(DVec3::new(pick(0), pick(1), pick(2)));
         if p.z <= 1e-3 {
             return [f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY];
         }

@@ -1,7 +1,7 @@
 //! The kernels of sketchcore, in the order in which a shape travels:
 //!
 //! ```text
-//! random -> grammar -> csg ------> voxel                      the truth, world grid
+//! random -> grammar -> csg, fit -> voxel                      the truth, world grid
 //!         triangle mesh -> solid ----^
 //!                       |
 //!                     camera ----> raycast -> buffers -> lines, kinds -> pen    the drawing
@@ -29,6 +29,7 @@ mod dispatch;
 pub mod distance;
 pub mod error;
 pub mod evidence;
+pub mod fit;
 pub mod grammar;
 pub mod hatching;
 mod intersect;

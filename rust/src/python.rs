@@ -46,7 +46,7 @@ mod _core {
     #[pymodule_export]
     use super::lift::{lift, lift_taps, lift_transposed};
     #[pymodule_export]
-    use super::samples::{default_config, generate};
+    use super::samples::{default_config, fit, generate};
     #[pymodule_export]
     use super::strokes::{check_style, draw_kinds, hidden_lines, random_style, redraw, style_camera, trace};
     #[pymodule_export]

@@ -66,7 +66,7 @@ pub struct Hits {
 impl Tile {
     pub fn new(caster: &RayCaster) -> Self {
         let none = Crossing { primitive: 0, additive: true, start: [0.0; RAYS], end: [0.0; RAYS] };
-        let crossings = vec![none; caster.primitives.len()];
+        let crossings = vec![none; caster.primitives.iter().map(Placed::intervals).sum()];
         Self { rows: [0.0; TILE], candidates: Vec::new(), direction: [[0.0; RAYS]; 3], crossings, met: 0 }
     }
 
@@ -101,7 +101,18 @@ impl Tile {
             }
             let crossing = &mut self.crossings[self.met];
             (crossing.primitive, crossing.additive) = (primitive, additive);
-            self.met += usize::from(placed.cross(&self.direction, &mut crossing.start, &mut crossing.end));
+            let met = placed.cross(&self.direction, &mut crossing.start, &mut crossing.end);
+            match placed.arc() {
+                Some(arc) if met => {
+                    // In the box around it.
+                    let (stretches, count) = arc.cross(&self.direction, &crossing.start, &crossing.end);
+                    for [start, end] in &stretches[..count] {
+                        self.crossings[self.met] = Crossing { primitive, additive, start: *start, end: *end };
+                        self.met += 1;
+                    }
+                }
+                _ => self.met += usize::from(met),
+            }
         }
         self.met > 0
     }
@@ -250,15 +261,16 @@ impl Hits {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::csg::tests::any_kind;
     use crate::csg::{Kind, Primitive};
     use glam::DVec3;
     use proptest::prelude::*;
 
     fn any_shape() -> impl Strategy<Value = Shape> {
         let triple = |lo: f64, hi: f64| [lo..hi, lo..hi, lo..hi];
-        let primitive = (0..16u8, any::<bool>(), triple(-0.3, 0.3), triple(0.02, 0.25)).prop_map(
+        let primitive = (any_kind(), any::<bool>(), triple(-0.3, 0.3), triple(0.02, 0.25)).prop_map(
             |(kind, additive, center, half)| Primitive {
-                kind: Kind::from_code(kind.into()).unwrap(),
+                kind,
                 additive,
                 center: center.into(),
                 half: half.into(),

@@ -143,6 +143,18 @@ fn write_primitives(words: &mut [u64], primitives: &[Primitive]) {
                 let [u, v] = corner.map(f64::from);
                 write_prism(words, p, &within, axis, |a, b| u * a + v * b >= 0.0);
             }
+            Kind::Frustum(frustum) => {
+                let (slopes, axis) = (frustum.slopes(p.half), frustum.axis);
+                if frustum.round {
+                    write_points(words, p, axis, |d| slopes.hold(true, d));
+                } else {
+                    write_points(words, p, axis, |d| slopes.hold(false, d));
+                }
+            }
+            Kind::Torus(torus) => {
+                let ring = torus.ring(p.half);
+                write_points(words, p, torus.axis, |d| ring.hold(d));
+            }
         }
     }
 }
@@ -179,6 +191,31 @@ fn write_prism(
             let row: [u64; SIDE] = rows(within[2]);
             std::array::from_fn(|y| if inside(along_u[x], along_v[y]) { row[y] } else { 0 })
         }),
+    }
+}
+
+/// Writes the voxels that are inside, in the box around a primitive; `inside` is asked by offsets from its centre, along
+/// the two cross axes and its own.
+#[inline(always)]
+fn write_points(words: &mut [u64], p: &Primitive, axis: usize, inside: impl Fn([f64; 3]) -> bool) {
+    let (lo, hi) = p.bounds();
+    // Not exactly the box: whether a point in its surface is inside is for `inside` to say.
+    let range = |a: usize| {
+        let (from, to) = ((lo[a] + 0.5) * SIDE as f64 - 1.0, (hi[a] + 0.5) * SIDE as f64 + 1.0);
+        from.clamp(0.0, SIDE as f64) as usize..to.clamp(0.0, SIDE as f64) as usize
+    };
+    let offsets = |a: usize| -> [f64; SIDE] { std::array::from_fn(|i| CENTERS[i] - p.center[a]) };
+    let (dx, dy, dz) = (offsets(0), offsets(1), offsets(2));
+    for x in range(0) {
+        for y in range(1) {
+            let column = match axis {
+                0 => mask(|z| inside([dy[y], dz[z], dx[x]])),
+                1 => mask(|z| inside([dx[x], dz[z], dy[y]])),
+                _ => mask(|z| inside([dx[x], dy[y], dz[z]])),
+            };
+            let word = &mut words[x * SIDE + y];
+            *word = if p.additive { *word | column } else { *word & !column };
+        }
     }
 }
 
@@ -225,19 +262,19 @@ fn spread_bits(word: u64) -> [u8; SIDE] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::csg::tests::any_kind;
     use glam::DVec3;
     use proptest::prelude::*;
 
     pub fn any_primitive() -> impl Strategy<Value = Primitive> {
         let triple = |lo: f64, hi: f64| [lo..hi, lo..hi, lo..hi];
-        (0..16u8, any::<bool>(), triple(-0.4, 0.4), triple(0.01, 0.3)).prop_map(
-            |(kind, additive, center, half)| Primitive {
-                kind: Kind::from_code(kind.into()).unwrap(),
-                additive,
-                center: center.into(),
-                half: half.into(),
-            },
-        )
+        let solid = (any::<bool>(), triple(-0.4, 0.4), triple(0.01, 0.3));
+        (any_kind(), solid).prop_map(|(kind, (additive, center, half))| Primitive {
+            kind,
+            additive,
+            center: center.into(),
+            half: half.into(),
+        })
     }
 
     proptest! {
@@ -274,7 +311,7 @@ mod tests {
     fn a_wedge_is_half_of_its_box() {
         for code in 4..16 {
             let wedge = Primitive {
-                kind: Kind::from_code(f64::from(code)).unwrap(),
+                kind: Kind::from_code(f64::from(code), [0.0; 4]).unwrap(),
                 additive: true,
                 center: DVec3::ZERO,
                 half: DVec3::splat(0.25),

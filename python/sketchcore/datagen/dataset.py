@@ -10,6 +10,7 @@ from torch import Tensor
 from torch.utils.data import IterableDataset, get_worker_info
 
 from sketchcore.datagen.generate import generate
+from sketchcore.datagen.grammars import Grammar, find_grammar
 
 
 class Generated(IterableDataset[dict[str, Tensor]]):
@@ -25,7 +26,8 @@ class Generated(IterableDataset[dict[str, Tensor]]):
         count: how many samples over all ranks and workers; None for no end.
         first: index of the first.
         views: drawings a sample, 1 to 13.
-        config: what differs from `sketchcore.datagen.default_config()`.
+        config: what differs from `sketchcore.datagen.default_config(grammar)`.
+        grammar: as for `sketchcore.generate`.
         rank: this process's number; None asks torch.distributed, and is 0 without it.
         ranks: how many processes there are; None likewise.
 
@@ -42,6 +44,7 @@ class Generated(IterableDataset[dict[str, Tensor]]):
         first: int = 0,
         views: int = 1,
         config: Mapping[str, Any] | None = None,
+        grammar: str | Grammar | None = None,
         rank: int | None = None,
         ranks: int | None = None,
     ) -> None:
@@ -50,9 +53,9 @@ class Generated(IterableDataset[dict[str, Tensor]]):
         if rank is not None and ranks is not None and not 0 <= rank < ranks:
             raise ValueError(f"rank must lie between 0 and ranks - 1, got {rank} of {ranks}")
         self.seed, self.count, self.first, self.views = seed, count, first, views
-        self.config = dict(config or {})
+        self.config, self.grammar = dict(config or {}), None if grammar is None else find_grammar(grammar)
         self.rank, self.ranks = rank, ranks
-        generate(seed, 0, first=first, views=views, config=self.config)  # says now what is wrong
+        generate(seed, 0, first=first, views=views, config=self.config, grammar=self.grammar)  # says now what is wrong
 
     def __iter__(self) -> Iterator[dict[str, Tensor]]:
         rank, ranks = self._place()
@@ -73,7 +76,8 @@ class Generated(IterableDataset[dict[str, Tensor]]):
         return 0, 1
 
     def _sample(self, index: int) -> dict[str, Tensor]:
-        batch = generate(self.seed, 1, first=index, views=self.views, config=self.config, threads=1)
+        chosen: dict[str, Any] = {"config": self.config, "grammar": self.grammar}
+        batch = generate(self.seed, 1, first=index, views=self.views, threads=1, **chosen)
         return {
             "drawings": torch.from_numpy(batch.drawings[0]),
             "world": torch.from_numpy(batch.world[0]),

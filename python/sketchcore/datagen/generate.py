@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sketchcore import _core
 from sketchcore.camera import Camera
+from sketchcore.datagen.grammars import Grammar, find_grammar
 from sketchcore.destination import destination
 from sketchcore.shape import Shape
 
@@ -28,7 +29,7 @@ class Batch:
         world: uint8 [count, 64, 64, 64] (x, y, z), 0 or 1.
         frusta: uint8 [count, views, 64, 64, 64] (depth, row, col), the share of a cell that is inside; 255 = all.
         packed_cameras: float64 [count, views, 15], see `Camera.packed`.
-        packed_shapes: for each sample float64 [n, 8], see `Shape.packed`.
+        packed_shapes: for each sample float64 [n, 8] or [n, 12], see `Shape.packed`.
     """
 
     drawings: NDArray[np.uint8]
@@ -48,12 +49,17 @@ class Batch:
         return [Shape.from_packed(rows) for rows in self.packed_shapes]
 
 
-def default_config() -> dict[str, Any]:
+def default_config(grammar: str | Grammar | None = None) -> dict[str, Any]:
     """Every amplitude and count of the generator with its default, as nested dictionaries.
 
     Pass what should differ to `generate`; what is left out keeps its default.
+
+    Args:
+        grammar: whose entries are those of "grammar"; None for the abstract one.
     """
     config: dict[str, Any] = json.loads(_core.default_config())
+    if grammar is not None:
+        config["grammar"] = find_grammar(grammar).to_dict()
     return config
 
 
@@ -64,14 +70,15 @@ def generate(
     first: int = 0,
     views: int = 1,
     config: Mapping[str, Any] | None = None,
+    grammar: str | Grammar | None = None,
     threads: int | None = None,
     out: Batch | Arrays | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Batch:
-    """Makes samples `first` ... `first + count - 1` of the data set that `config` and `seed` name.
+    """Makes samples `first` ... `first + count - 1` of the data set that `grammar`, `config` and `seed` name.
 
-    Sample i depends on (config, seed, i) alone: not on `count`, `threads` or the machine; and its first views do
-    not depend on `views`. View 0 is one of the eight three-quarter viewpoints, the others are distinct ones of
+    Sample i depends on (grammar, config, seed, i) alone: not on `count`, `threads` or the machine; and its first views
+    do not depend on `views`. View 0 is one of the eight three-quarter viewpoints, the others are distinct ones of
     the 13, each displaced as far as the shape stays in sight.
 
     Args:
@@ -79,7 +86,9 @@ def generate(
         count: how many samples, at least 0.
         first: index of the first one, 0 ... 2^64 - 1.
         views: drawings a sample, 1 to 13.
-        config: what differs from `default_config()`.
+        config: what differs from `default_config(grammar)`.
+        grammar: what shapes are of: "chair", "vase", a Python file that defines a grammar, or a `Grammar`; None for
+            abstract ones.
         threads: threads to use; None for one a core. They wait for the next call, if there is a core for each.
         out: a batch, or arrays (drawings, world, frusta) of its shapes and dtypes, to write into: a training loop
             that hands the last batch back makes no large array. Of that batch, shapes and cameras stay.
@@ -89,9 +98,9 @@ def generate(
     Ctrl-C stops a batch within a fraction of a second.
 
     Raises:
-        ValueError: for an argument out of range, an unknown or wrong entry of the config, or `out` arrays of
-            another shape.
-        TypeError: for `out` arrays of another dtype.
+        ValueError: for an argument out of range, an unknown grammar, an unknown or wrong entry of the config, or `out`
+            arrays of another shape.
+        TypeError: for `out` arrays of another dtype, or what is no grammar.
         RuntimeError: if the config allows no shape.
         KeyboardInterrupt: at Ctrl-C, when the last thread has stopped; `out` is partly written then.
     """
@@ -109,8 +118,12 @@ def generate(
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be callable, got {type(progress).__name__}")
     drawings, world, frusta = _arrays(out, count, views)
-    text = json.dumps(dict(config or {}))
-    shapes, cameras = _core.generate(text, seed, first, threads, drawings, world, frusta, progress)
+    entries, given = dict(config or {}), None
+    if grammar is not None:
+        chosen = find_grammar(grammar).changed(entries.pop("grammar", {}))
+        given = [chosen.draw(seed, first + i) for i in range(count)]
+    text = json.dumps(entries)
+    shapes, cameras = _core.generate(text, seed, first, threads, drawings, world, frusta, progress, given)
     return Batch(drawings, world, frusta, cameras, shapes)
 
 

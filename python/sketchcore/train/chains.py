@@ -57,7 +57,7 @@ def start_chain(preset: Preset, seed: int, index: int) -> Chain:
     random = np.random.default_rng((seed, index))
     views = 1 + int(random.choice(len(DRAWINGS), p=DRAWINGS))
     length = 1 + int(random.choice(len(PASSES), p=PASSES))
-    batch = generate(seed, 1, first=index, views=views, config=preset.generator, threads=1)
+    batch = generate(seed, 1, first=index, views=views, config=preset.generator, grammar=preset.grammar, threads=1)
     chain = Chain(
         Sketches(batch.drawings[0], batch.packed_cameras[0]),
         WORLD_TRUTHS[preset.truth](batch, 0),
@@ -80,6 +80,7 @@ class ChainStage:
     def __init__(self, preset: Preset, seed: int, device: torch.device, samples: int, config: CompactConfig) -> None:
         self.model = place(CompactNet(config), device)
         self._device = device
+        self._grammar = preset.grammar
         self._loss = distance_loss if preset.truth == "distance" else occupancy_loss
         self.samples = 0
         self._chains = Ahead(partial(start_chain, preset, seed), samples, 2 * preset.batch, preset.threads)
@@ -112,7 +113,7 @@ class ChainStage:
     def measure(self, net: nn.Module) -> float:
         """The held-out IoU of a network like the model: from one drawing and from three, after a round."""
         assert isinstance(net, CompactNet)
-        scores = heldout_iou(CompactModel(net, self._device), views=(1, 3))
+        scores = heldout_iou(CompactModel(net, self._device), views=(1, 3), grammar=self._grammar)
         return sum(scores) / len(scores)
 
     def close(self) -> None:

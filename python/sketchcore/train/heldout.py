@@ -15,9 +15,11 @@ SEED = 2**63
 """Training seeds lie below; held-out shapes have this one."""
 
 
-def heldout_iou(model: Model, views: Sequence[int], rounds: int = 1, shapes: int = 16) -> list[float]:
-    """Mean IoU in the world grid after some rounds over exact drawings, for each number of views."""
-    batch = generate(SEED, shapes, views=max(views))
+def heldout_iou(
+    model: Model, views: Sequence[int], rounds: int = 1, shapes: int = 16, grammar: str | None = None
+) -> list[float]:
+    """Mean IoU in the world grid after some rounds over exact drawings of a grammar's shapes, by numbers of views."""
+    batch = generate(SEED, shapes, views=max(views), grammar=grammar)
     scores = []
     for count in views:
         each = []

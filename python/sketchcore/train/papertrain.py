@@ -6,6 +6,7 @@ The multi-scale network is trained like the single view.
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 import torch
@@ -31,7 +32,8 @@ def _batches(preset: Preset, seed: int, first: int, views: int) -> Ahead[Batch]:
 
 def _batch(preset: Preset, seed: int, first: int, views: int, number: int) -> Batch:
     first += number * preset.batch
-    return generate(seed, preset.batch, first=first, views=views, config=preset.generator, threads=1)
+    chosen: dict[str, Any] = {"config": preset.generator, "grammar": preset.grammar}
+    return generate(seed, preset.batch, first=first, views=views, threads=1, **chosen)
 
 
 class SingleStage:
@@ -45,7 +47,7 @@ class SingleStage:
     def __init__(self, preset: Preset, seed: int, device: torch.device, samples: int, net: SingleViewNet) -> None:
         self.model = place(net, device)
         self.samples = 0
-        self._truth = preset.truth
+        self._truth, self._grammar = preset.truth, preset.grammar
         self._device = device
         self._batches = _batches(preset, seed, samples, views=1)
 
@@ -66,7 +68,7 @@ class SingleStage:
     def measure(self, net: nn.Module) -> float:
         """The held-out IoU of a network like the model: from one drawing."""
         assert isinstance(net, PaperNet | MultiscaleNet)
-        return heldout_iou(SingleViewModel(net, self._device), views=(1,), rounds=0)[0]
+        return heldout_iou(SingleViewModel(net, self._device), views=(1,), rounds=0, grammar=self._grammar)[0]
 
     def close(self) -> None:
         """Stops the threads."""
@@ -84,7 +86,7 @@ class UpdaterStage:
     def __init__(self, preset: Preset, seed: int, device: torch.device, samples: int, single: PaperNet) -> None:
         self.model = place(PaperNet(updater=True, width=single.width), device)
         self.samples = 0
-        self._truth = preset.truth
+        self._truth, self._grammar = preset.truth, preset.grammar
         self._single = single
         self._predict = SingleViewModel(single, device).predict
         self._device = device
@@ -115,7 +117,8 @@ class UpdaterStage:
     def measure(self, net: nn.Module) -> float:
         """The held-out IoU of a network like the model: from two drawings, after a round."""
         assert isinstance(net, PaperNet)
-        return heldout_iou(PaperModel(self._single, net, self._device), views=(2,), rounds=1)[0]
+        model = PaperModel(self._single, net, self._device)
+        return heldout_iou(model, views=(2,), rounds=1, grammar=self._grammar)[0]
 
     def close(self) -> None:
         """Stops the threads."""

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
+from sketchcore.datagen.grammars import find_grammar
+
 STAGES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {"compact": ("compact",), "paper": ("single", "updater"), "multiscale": ("multiscale",)}
 )
@@ -37,12 +39,13 @@ class Preset:
         cooldown: last share of the run over which the rate falls to 0; 0 keeps it fixed.
         average: decay of the exponential moving average of the weights that is evaluated and saved; 0 for none.
         clip: largest norm of the gradient; 0 for no limit.
+        grammar: what shapes are of, as `sketchcore.generate` takes it; None for abstract ones.
         generator: what differs from the generator's default config.
         threads: threads that make samples; None for one a core.
         minutes: how long a run takes that is not told, over all the pieces that it is trained in; None if it must be.
 
     Raises:
-        ValueError: for an unknown network, or a truth that is not one of its.
+        ValueError: for an unknown network, a truth that is not one of its, or an unknown grammar.
     """
 
     network: str
@@ -56,6 +59,7 @@ class Preset:
     cooldown: float = 0.0
     average: float = 0.0
     clip: float = 0.0
+    grammar: str | None = None
     generator: Mapping[str, Any] = field(default_factory=dict)
     threads: int | None = 1
     minutes: float | None = None
@@ -63,6 +67,8 @@ class Preset:
     def __post_init__(self) -> None:
         if self.network not in STAGES:
             raise ValueError(f"unknown network {self.network!r}; the networks are {', '.join(STAGES)}")
+        if self.grammar is not None:
+            find_grammar(self.grammar)
         if self.truth not in TRUTHS[self.network]:
             known = ", ".join(TRUTHS[self.network])
             raise ValueError(f"the network {self.network!r} has no truth {self.truth!r}; it takes {known}")
@@ -110,6 +116,9 @@ COMPACT = Preset(
     },
 )
 
+# What is asked of drawings and cameras does not depend on the grammar.
+_DRAWN = {name: part for name, part in COMPACT.generator.items() if name != "grammar"}
+
 ALTERNATIVES: Mapping[str, Preset] = MappingProxyType(
     {
         "compact": COMPACT,
@@ -127,5 +136,20 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
         **ALTERNATIVES,
         "laptop": replace(COMPACT, minutes=60.0),
         "gpu": replace(COMPACT, batch=64, threads=None, minutes=25.0),
+        "chair": replace(COMPACT, grammar="chair", generator=_DRAWN),
+        "vase": replace(COMPACT, grammar="vase", generator=_DRAWN),
     }
 )
+
+
+def grammar_changes(preset: str, grammar: str | None) -> dict[str, Any]:
+    """What differs from a preset that is trained on another grammar's shapes: its name, and no entries of the old one.
+
+    Raises:
+        ValueError: for an unknown grammar; an unknown preset is left to who takes it.
+    """
+    if grammar is None or preset not in PRESETS:
+        return {}
+    find_grammar(grammar)
+    generator = {name: part for name, part in PRESETS[preset].generator.items() if name != "grammar"}
+    return {"grammar": grammar, "generator": generator}

@@ -1,7 +1,7 @@
 //! Arrays and numbers from Python: checked, and packed again on the way back.
 
 use crate::camera::{Camera, IMAGE, PACKED};
-use crate::csg::Shape;
+use crate::csg::{NARROW, Shape, WIDE};
 use crate::error::CoreError;
 use crate::voxel::SIDE;
 use numpy::{
@@ -97,8 +97,12 @@ pub fn check_size(size: i64) -> PyResult<usize> {
 }
 
 pub fn shape_of(rows: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Shape> {
-    let rows = checked(rows, "shape", &[-1, 8])?;
-    Ok(Shape::from_rows(rows.as_chunks().0)?)
+    let width = if rows.shape().get(1) == Some(&WIDE) { WIDE } else { NARROW };
+    let numbers = checked(rows, "shape", &[-1, width as isize])?;
+    Ok(match width {
+        WIDE => Shape::from_rows(numbers.as_chunks::<WIDE>().0)?,
+        _ => Shape::from_rows(numbers.as_chunks::<NARROW>().0)?,
+    })
 }
 
 pub fn cameras_of(rows: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<Camera>> {

@@ -1,12 +1,17 @@
 //! Whole samples, in parallel.
 
-use super::arrays::checked_mut;
+use super::arrays::{checked_mut, same_count, shape_of};
 use super::pools::pool;
 use crate::batch::{SampleConfig, Slot, Watch, batch};
 use crate::camera::{Camera, IMAGE, PACKED, VIEWPOINTS};
+use crate::csg::Shape;
 use crate::error::CoreError;
+use crate::fit::Fit;
 use crate::voxel::{CELLS, SIDE};
-use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadwriteArrayDyn, PyUntypedArrayMethods};
+use numpy::{
+    IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn,
+    PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use rayon::Scope;
 use std::sync::mpsc::channel;
@@ -20,7 +25,7 @@ pub fn default_config() -> String {
 type Made<'py> = (Vec<Bound<'py, PyArray2<f64>>>, Bound<'py, PyArray3<f64>>);
 
 #[pyfunction]
-#[pyo3(signature = (config, seed, first, threads, drawings, world, frusta, progress=None))]
+#[pyo3(signature = (config, seed, first, threads, drawings, world, frusta, progress=None, shapes=None))]
 #[expect(clippy::too_many_arguments, reason = "the arrays of a batch, each by name")]
 pub fn generate<'py>(
     py: Python<'py>,
@@ -32,6 +37,7 @@ pub fn generate<'py>(
     mut world: PyReadwriteArrayDyn<'py, u8>,
     mut frusta: PyReadwriteArrayDyn<'py, u8>,
     progress: Option<Py<PyAny>>,
+    shapes: Option<Vec<PyReadonlyArrayDyn<'py, f64>>>,
 ) -> PyResult<Made<'py>> {
     let config = SampleConfig::from_json(config)?;
     let (image, side) = (IMAGE as isize, SIDE as isize);
@@ -49,9 +55,13 @@ pub fn generate<'py>(
         .zip(frusta.chunks_exact_mut(views * CELLS))
         .map(|((drawings, world), frusta)| Slot { drawings, world, frusta })
         .collect();
+    let given: Option<Vec<Shape>> = shapes.map(|shapes| shapes.iter().map(shape_of).collect()).transpose()?;
+    if let Some(given) = &given {
+        same_count("shapes", given.len(), count)?;
+    }
     let watch = Watch::default();
     let made = py.detach(|| {
-        let work = || batch(&config, seed, first, slots, &watch);
+        let work = || batch(&config, seed, first, given.as_deref(), slots, &watch);
         match threads {
             None => rayon::in_place_scope(|scope| watched(scope, work, &watch, progress.as_ref())),
             Some(threads) => {
@@ -63,12 +73,28 @@ pub fn generate<'py>(
     let packed: Vec<f64> =
         made.iter().flat_map(|(_, cameras)| cameras.iter().flat_map(Camera::to_packed)).collect();
     let cameras = packed.into_pyarray(py).reshape([count, views, PACKED])?;
-    let shapes = made.iter().map(|(shape, _)| {
-        let rows = shape.to_rows();
-        let count = rows.len();
-        rows.into_flattened().into_pyarray(py).reshape([count, 8])
-    });
+    let shapes = made.iter().map(|(shape, _)| rows(py, shape));
     Ok((shapes.collect::<PyResult<_>>()?, cameras))
+}
+
+fn rows<'py>(py: Python<'py>, shape: &Shape) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (numbers, width) = shape.to_rows();
+    let count = numbers.len() / width;
+    numbers.into_pyarray(py).reshape([count, width])
+}
+
+/// A shape by the 120 % rule; `None` if it is empty, in pieces, or dust.
+#[pyfunction]
+pub fn fit<'py>(
+    py: Python<'py>,
+    shape: PyReadonlyArrayDyn<'py, f64>,
+    cover: f64,
+    min_occupancy: f64,
+    min_extent: usize,
+) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+    let shape = shape_of(&shape)?;
+    let fitted = py.detach(|| Fit { cover, min_occupancy, min_extent }.fit(shape));
+    fitted.map(|(shape, _)| rows(py, &shape)).transpose()
 }
 
 /// How often the calling thread looks for signals and says how far the work is.
