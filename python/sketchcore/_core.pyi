@@ -11,6 +11,8 @@ __all__ = [
     "carve",
     "default_config",
     "draw",
+    "draw_mesh",
+    "draw_mesh_views",
     "evidence",
     "evidence_fields",
     "frustum",
@@ -20,12 +22,14 @@ __all__ = [
     "lift_taps",
     "lift_transposed",
     "lines",
+    "mesh_buffers",
     "silhouettes",
     "to_camera_grid",
     "to_world_grid",
     "viewpoints",
     "voxelize",
     "voxelize_mesh",
+    "voxelize_mesh_finer",
 ]
 
 def viewpoints() -> NDArray[np.float64]: ...
@@ -33,6 +37,30 @@ def voxelize(shape: NDArray[np.float64], out: NDArray[np.uint8] | None = None) -
 def voxelize_mesh(
     vertices: NDArray[np.float64], faces: NDArray[np.int64], out: NDArray[np.uint8] | None = None
 ) -> NDArray[np.uint8]: ...
+def voxelize_mesh_finer(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float32]: ...
+def mesh_buffers(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    crease_degrees: float,
+    camera: NDArray[np.float64],
+    size: int,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
+def draw_mesh(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    crease_degrees: float,
+    camera: NDArray[np.float64],
+    out: NDArray[np.uint8] | None = None,
+) -> NDArray[np.uint8]: ...
+def draw_mesh_views(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    crease_degrees: float,
+    config: str,
+    seed: int,
+    index: int,
+    drawings: NDArray[np.uint8],
+) -> NDArray[np.float64]: ...
 def frustum(shape: NDArray[np.float64], camera: NDArray[np.float64], rays: int) -> NDArray[np.uint8]: ...
 def buffers(
     shape: NDArray[np.float64], camera: NDArray[np.float64], size: int

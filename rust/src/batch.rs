@@ -5,9 +5,10 @@ use crate::camera::{Camera, DISTANCE, FAR, FOV_DEGREES, IMAGE, NEAR, QUARTER_VIE
 use crate::csg::Shape;
 use crate::error::CoreError;
 use crate::grammar::GrammarConfig;
-use crate::lines::{LineConfig, draw};
+use crate::lines::LineConfig;
 use crate::pen::{PenConfig, redraw};
 use crate::random::Random;
+use crate::subject::Subject;
 use crate::voxel::CELLS;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -161,25 +162,40 @@ pub fn sample(
     index: u64,
     slot: Slot,
 ) -> Result<(Shape, Vec<Camera>), CoreError> {
-    let views = slot.drawings.len() / (IMAGE * IMAGE);
     let (shape, grid) = config.grammar.draw(&mut Random::new(seed, index, SHAPE))?;
     grid.write_bytes(slot.world);
+    let cameras = draw_views(config, &shape, seed, index, slot.drawings)?;
+    for (camera, frustum) in cameras.iter().zip(slot.frusta.chunks_exact_mut(CELLS)) {
+        fill_frustum(&shape, camera, config.frustum_rays, frustum)?;
+    }
+    Ok((shape, cameras))
+}
+
+/// The drawings of sample `index`, as many as there is room for, of any subject; and the cameras that their truth is in.
+pub fn draw_views(
+    config: &SampleConfig,
+    subject: &impl Subject,
+    seed: u64,
+    index: u64,
+    drawings: &mut [u8],
+) -> Result<Vec<Camera>, CoreError> {
+    let views = drawings.len() / (IMAGE * IMAGE);
     let free = |v: usize| Random::new(seed, index, FREE + v as u64);
-    let cameras = draw_cameras(config, &shape, views, &mut Random::new(seed, index, CAMERAS), free);
-    let arrays = slot.drawings.chunks_exact_mut(IMAGE * IMAGE).zip(slot.frusta.chunks_exact_mut(CELLS));
-    for (v, ((stand, camera), (drawing, frustum))) in cameras.iter().zip(arrays).enumerate() {
+    let cameras = draw_cameras(config, subject, views, &mut Random::new(seed, index, CAMERAS), free);
+    for (v, ((stand, camera), drawing)) in
+        cameras.iter().zip(drawings.chunks_exact_mut(IMAGE * IMAGE)).enumerate()
+    {
         let mut random = Random::new(seed, index, PEN + v as u64);
         if random.chance(config.hand.share) {
-            let hand = hand_camera(&config.hand, stand, camera, &shape, &mut random);
-            draw(&shape, &hand, &config.lines, drawing)?;
+            let hand = hand_camera(&config.hand, stand, camera, subject, &mut random);
+            subject.draw(&hand, &config.lines, drawing)?;
             let ink = drawing.iter().map(|&ink| ink > 0).collect();
             drawing.copy_from_slice(&redraw(ink, &config.hand.pen, &mut random));
         } else {
-            draw(&shape, camera, &config.lines, drawing)?;
+            subject.draw(camera, &config.lines, drawing)?;
         }
-        fill_frustum(&shape, camera, config.frustum_rays, frustum)?;
     }
-    Ok((shape, cameras.into_iter().map(|(_, camera)| camera).collect()))
+    Ok(cameras.into_iter().map(|(_, camera)| camera).collect())
 }
 
 /// How far a batch is, for those who wait for it, and their means to stop it.
@@ -261,13 +277,13 @@ impl Stand {
 /// shape stays in sight.
 fn draw_cameras(
     config: &SampleConfig,
-    shape: &Shape,
+    subject: &impl Subject,
     views: usize,
     random: &mut Random,
     free: impl Fn(usize) -> Random,
 ) -> Vec<(Stand, Camera)> {
     let mut left: Vec<usize> = (0..VIEWPOINTS.len()).collect();
-    let corners = corners(shape);
+    let corners = corners(subject);
     (0..views)
         .map(|v| {
             let choices = if v == 0 { QUARTER_VIEWS } else { left.len() };
@@ -290,7 +306,7 @@ fn hand_camera(
     config: &HandConfig,
     stand: &Stand,
     camera: &Camera,
-    shape: &Shape,
+    subject: &impl Subject,
     random: &mut Random,
 ) -> Camera {
     // The product of two even numbers: mostly small, seldom near the largest.
@@ -306,13 +322,13 @@ fn hand_camera(
     let shift = DVec3::new(error(config.shift), error(config.shift), 0.0) * pixel;
     let displacement = camera.to_camera(DVec3::ZERO) + shift;
     let by = DVec3::new(0.0, 0.0, stand.distance()) - displacement;
-    let by = by * turned.room_for(by, &corners(shape));
+    let by = by * turned.room_for(by, &corners(subject));
     let turned = turned.displaced(by);
     Camera::new(turned.position, turned.axes, fov, camera.near, camera.far).unwrap_or(turned)
 }
 
-fn corners(shape: &Shape) -> Vec<DVec3> {
-    let (lo, hi) = shape.bounds();
+fn corners(subject: &impl Subject) -> Vec<DVec3> {
+    let (lo, hi) = subject.bounds();
     (0..8)
         .map(|c| {
             let pick = |a: usize| if c >> a & 1 == 0 { lo[a] } else { hi[a] };

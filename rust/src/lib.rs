@@ -3,8 +3,9 @@
 //! ```text
 //! random -> grammar -> csg ------> voxel                      the truth, world grid
 //!         triangle mesh -> solid ----^
-//!                       |
-//!                     camera ----> raycast -> buffers -> lines -> pen       the drawing
+//!               |       |
+//!               |     camera ----> raycast -> buffers -> lines -> pen       the drawing
+//!               +-> surface -----> raster ------^
 //!                                     |
 //!                                     +------> buffers::fill_frustum        the truth, camera grid
 //! batch: all of these for one sample, and samples side by side
@@ -38,8 +39,11 @@ pub mod pen;
 #[cfg(feature = "python")]
 mod python;
 pub mod random;
+pub mod raster;
 pub mod raycast;
 pub mod resample;
 pub mod solid;
+pub mod subject;
+pub mod surface;
 pub mod trilinear;
 pub mod voxel;

@@ -36,7 +36,7 @@ pub fn frustum<'py>(
     grid(py, cells, &[])
 }
 
-type BufferArrays<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray3<f32>>);
+pub type BufferArrays<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray3<f32>>);
 
 #[pyfunction]
 pub fn buffers<'py>(
@@ -65,7 +65,7 @@ pub fn isosurface<'py>(
     buffer_arrays(py, py.detach(|| crate::isosurface::cast(volume, level, &camera, size)))
 }
 
-fn buffer_arrays<'py>(py: Python<'py>, made: Buffers) -> PyResult<BufferArrays<'py>> {
+pub fn buffer_arrays<'py>(py: Python<'py>, made: Buffers) -> PyResult<BufferArrays<'py>> {
     let size = made.size;
     let depth = made.depth.into_pyarray(py).reshape([size, size])?;
     let normal = made.normal.into_flattened().into_pyarray(py).reshape([size, size, 3])?;

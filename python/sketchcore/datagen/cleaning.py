@@ -1,0 +1,154 @@
+"""A mesh from elsewhere as a data set keeps it: placed in the world, cleaned, voxelised; and what was found on the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sketchcore import _core
+from sketchcore.camera import VIEWPOINTS
+from sketchcore.datagen.upright import facing, symmetry, turn
+from sketchcore.grids import CREASE_DEGREES
+
+COVER = 1.2
+"""The world's cube is 120 % of a mesh's largest side."""
+FILLED = 0.5
+"""A mesh whose voxels fill less of its outline than this is left out: most of it is thinner than a voxel."""
+_SEEN_FROM = ("quarter-037", "right", "top")
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A mesh in the world.
+
+    Attributes:
+        vertices: float32 [n, 3], each one in another place.
+        faces: int32 [m, 3].
+        world: uint8 [64, 64, 64], 0 or 1.
+        found: what was repaired and measured, plain data.
+    """
+
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.int32]
+    world: NDArray[np.uint8]
+    found: dict[str, Any]
+
+
+class LeftOutError(ValueError):
+    """Why a mesh makes no object of a data set."""
+
+
+def place(vertices: NDArray[np.float64], faces: NDArray[np.int64], up: str, front: str | None) -> Placed:
+    """Turns, scales and centres a mesh, and takes away what is of no use in it.
+
+    Args:
+        vertices: float64 [n, 3], as in the file.
+        faces: int64 [m, 3].
+        up: one of `upright.AXES`.
+        front: likewise, in the file's axes; None to look for it (`upright.facing`).
+
+    Raises:
+        LeftOutError: for a mesh without faces or extent, with an index out of range or coordinates that are not finite,
+            that encloses nothing, or whose voxels fill little of its outline.
+    """
+    found: dict[str, Any] = {"faces_in_file": len(faces), "up": up}
+    vertices, faces = _sound(vertices, faces)
+    turned = vertices @ turn(up, front).T
+    points, corners, cleaned = _clean(turned, faces)
+    if front is None:
+        # Which way it looks is read off the voxels.
+        ahead = facing(_voxels(points, corners))
+        points, corners, cleaned = _clean(turned @ turn("y", ahead).T, faces)
+        front = _named(turn(up).T @ turn("y", ahead)[0])
+    world = _voxels(points, corners)
+    edges = _edges(corners)
+    filled = _filled(points, corners, world)
+    found |= cleaned | {
+        "front": front,
+        "faces": len(corners),
+        "open_edges": edges[0],
+        "crowded_edges": edges[1],
+        "turned_edges": edges[2],
+        "closed": edges == (0, 0, 0),
+        "occupied": float(world.mean()),
+        "symmetry": round(symmetry(world), 4),
+        "filled": round(filled, 4),
+    }
+    if filled < FILLED:
+        raise LeftOutError(f"too thin for voxels: they fill {filled:.0%} of its outline, not {FILLED:.0%}")
+    return Placed(points, corners, world, found)
+
+
+def _named(vector: NDArray[np.float64]) -> str:
+    axis = int(np.argmax(np.abs(vector)))
+    return ("-" if vector[axis] < 0 else "") + "xyz"[axis]
+
+
+def _sound(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The vertices that faces name, and the faces; raises for what cannot be mended."""
+    if len(faces) == 0:
+        raise LeftOutError("no faces")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise LeftOutError(f"a face names a vertex that is not there (of {len(vertices)})")
+    used, again = np.unique(faces, return_inverse=True)
+    vertices = vertices[used]
+    if not np.isfinite(vertices).all():
+        raise LeftOutError("NaN or infinite coordinates")
+    if not np.ptp(vertices, axis=0).max() > 0:
+        raise LeftOutError("no extent: all vertices are in one place")
+    return vertices, again.reshape(-1, 3)
+
+
+def _clean(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.float32], NDArray[np.int32], dict[str, int]]:
+    """Placed by the 120 % rule, same vertices merged, faces without area and doubled ones taken away."""
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    placed = ((vertices - (low + high) / 2) / (COVER * (high - low).max())).astype(np.float32)
+    points, names = np.unique(placed, axis=0, return_inverse=True)
+    corners = names[faces].reshape(-1, 3)
+    flat = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
+    corners = corners[~flat]
+    _, first = np.unique(np.sort(corners, axis=1), axis=0, return_index=True)
+    kept = corners[np.sort(first)]
+    if len(kept) == 0:
+        raise LeftOutError("no face has an area")
+    found = {
+        "merged_vertices": len(placed) - len(points),
+        "degenerate_faces": int(flat.sum()),
+        "doubled_faces": len(corners) - len(kept),
+    }
+    return points, np.ascontiguousarray(kept, np.int32), found
+
+
+def _voxels(points: NDArray[np.float32], corners: NDArray[np.int32]) -> NDArray[np.uint8]:
+    world = _core.voxelize_mesh(points.astype(np.float64), corners.astype(np.int64))
+    if not world.any():
+        raise LeftOutError("encloses nothing: a sheet, or thinner than a voxel all over")
+    return world
+
+
+def _edges(corners: NDArray[np.int32]) -> tuple[int, int, int]:
+    """How many edges have one face, more than two faces, and two faces that run along them the same way."""
+    runs = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
+    sorted_runs = np.sort(runs, axis=1)
+    _, which, faces = np.unique(sorted_runs, axis=0, return_inverse=True, return_counts=True)
+    forward = np.bincount(which.ravel(), runs[:, 0] < runs[:, 1], len(faces))
+    turned = (faces == 2) & (forward != 1)
+    return int((faces == 1).sum()), int((faces > 2).sum()), int(turned.sum())
+
+
+def _filled(points: NDArray[np.float32], corners: NDArray[np.int32], world: NDArray[np.uint8]) -> float:
+    """The least share of the mesh's outline that its voxels fill, seen from three sides."""
+    vertices, faces = points.astype(np.float64), corners.astype(np.int64)
+    shares = []
+    for name in _SEEN_FROM:
+        camera = VIEWPOINTS[name].packed
+        depth, _ = _core.mesh_buffers(vertices, faces, CREASE_DEGREES, camera, 64)
+        voxels = _core.to_camera_grid(world[None].astype(np.float32), camera[None])[0]
+        seen = np.isfinite(depth)
+        shares.append(float((voxels.max(axis=0)[seen] > 0).mean()) if seen.any() else 0.0)
+    return min(shares)
