@@ -23,13 +23,13 @@ __all__ = [
     "lift_transposed",
     "lines",
     "mesh_buffers",
+    "mesh_frusta",
     "silhouettes",
     "to_camera_grid",
     "to_world_grid",
     "viewpoints",
     "voxelize",
     "voxelize_mesh",
-    "voxelize_mesh_finer",
 ]
 
 def viewpoints() -> NDArray[np.float64]: ...
@@ -37,7 +37,9 @@ def voxelize(shape: NDArray[np.float64], out: NDArray[np.uint8] | None = None) -
 def voxelize_mesh(
     vertices: NDArray[np.float64], faces: NDArray[np.int64], out: NDArray[np.uint8] | None = None
 ) -> NDArray[np.uint8]: ...
-def voxelize_mesh_finer(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float32]: ...
+def mesh_frusta(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], cameras: NDArray[np.float64], rays: int
+) -> NDArray[np.uint8]: ...
 def mesh_buffers(
     vertices: NDArray[np.float64],
     faces: NDArray[np.int64],

@@ -77,8 +77,8 @@ def voxelize(shape: Solid, out: NDArray[np.uint8] | None = None) -> NDArray[np.u
 def frustum(shape: Solid, camera: Camera, rays: int = 4) -> NDArray[np.uint8]:
     """The camera grid of a solid: uint8 [64, 64, 64] (depth, row, col), the share of a cell inside, 255 = all.
 
-    Of a `Shape`, exact along depth, sampled by `rays` x `rays` (1 to 16) rays a cell across the image. Of a mesh, placed
-    as by `voxelize`, read in a world grid of 128^3 voxels, at 2 x 2 x 2 places a cell whatever `rays` says.
+    Sampled by `rays` x `rays` (1 to 16) rays a cell across the image. Along depth exact for a `Shape`; for a mesh,
+    placed as by `voxelize`, at four places a cell, in a world grid of 128^3 voxels.
 
     Raises:
         ValueError: if the camera stands inside the shape, or as `voxelize` does for a mesh.
@@ -87,19 +87,8 @@ def frustum(shape: Solid, camera: Camera, rays: int = 4) -> NDArray[np.uint8]:
     solid, packed = _as_solid(shape), _as_camera(camera).packed
     if not isinstance(solid, tuple):
         return _core.frustum(solid, packed, rays)
-    return frusta_of_mesh(*solid, packed[None])[0]
-
-
-def frusta_of_mesh(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], cameras: NDArray[np.float64]
-) -> NDArray[np.uint8]:
-    """The camera grids of a mesh, as `frustum` makes them, for packed cameras [n, 15]: uint8 [n, 64, 64, 64]."""
-    fine = _core.voxelize_mesh_finer(vertices, faces)[None]
-    grids = np.empty((len(cameras), SIDE, SIDE, SIDE), np.uint8)
-    for grid, camera in zip(grids, cameras, strict=True):
-        inside = _core.to_camera_grid(fine, np.ascontiguousarray(camera[None]))
-        grid[:] = np.rint(255 * inside.reshape(SIDE, 2, SIDE, 2, SIDE, 2).mean(axis=(1, 3, 5)))
-    return grids
+    grid: NDArray[np.uint8] = _core.mesh_frusta(*solid, packed[None], rays)[0]
+    return grid
 
 
 def buffers(

@@ -37,7 +37,7 @@ def load_mesh(path: str | os.PathLike[str]) -> trimesh.Trimesh:
         raise ValueError(f"{file} cannot be read as {file.suffix.lower()}: {_reason(error)}") from error
     if not parts:
         raise ValueError(f"{file} has no faces; a mesh needs triangles or polygons")
-    mesh = parts[0] if len(parts) == 1 else trimesh.util.concatenate(parts)
+    mesh: trimesh.Trimesh = parts[0] if len(parts) == 1 else trimesh.util.concatenate(parts)  # type: ignore[assignment]
     return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False, validate=False)
 
 

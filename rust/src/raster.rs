@@ -19,6 +19,13 @@ use glam::DVec3;
 const EDGE_ON: f64 = 1e-13;
 const NOBODY: u32 = u32::MAX;
 
+/// The round surface above a face, by Phong tessellation (Boubekeur and Alexa, 2008): half way from the face to where the
+/// tangent planes of its corners are. Over a chord of an arc that is the arc, and neighbours meet without a fold: else,
+/// near the limb, each would be a step of depth.
+const ROUND: f64 = 0.5;
+/// Rays are followed to that surface as if they met it at no smaller sine.
+const GRAZING: f64 = 0.15;
+
 impl Buffers {
     /// The nearest face behind the middle of each pixel.
     pub fn of_mesh(surface: &Surface, camera: &Camera, size: usize) -> Result<Self, CoreError> {
@@ -93,7 +100,7 @@ impl Seen {
         Self { nearness: vec![0.0; size * size], face: vec![NOBODY; size * size], size }
     }
 
-    /// Depths, and normals between those of the corners, turned towards the eye.
+    /// Depths of the round surfaces that the faces stand for, and their normals, turned towards the eye.
     fn shaded(self, surface: &Surface, camera: &Camera) -> Buffers {
         let size = self.size;
         let mut buffers =
@@ -105,14 +112,24 @@ impl Seen {
             }
             let Some(facet) = Facet::new(&surface.faces[face as usize], camera) else { continue };
             let point = DVec3::new(at(i % size), at(i / size), 1.0);
-            let corners = facet.shares.iter().zip(&surface.normals[face as usize]);
-            let sum: DVec3 = corners.map(|(share, &normal)| normal * share.dot(point).max(0.0)).sum();
             let ray = camera.ray(point.x, point.y);
-            let towards = if facet.behind { -sum } else { sum };
+            let depth = 1.0 / nearness;
+            let met = camera.position + ray * depth;
+            let shares = facet.shares.map(|share| share.dot(point).max(0.0));
+            let whole: f64 = shares.iter().sum();
+            let (mut sum, mut rise) = (DVec3::ZERO, DVec3::ZERO);
+            for (k, share) in shares.iter().enumerate() {
+                let (corner, normal) = (surface.faces[face as usize][k], surface.normals[face as usize][k]);
+                sum += normal * *share;
+                rise += normal * (normal.dot(corner - met) * ROUND * share / whole);
+            }
+            let towards = if facet.behind { -sum } else { sum }.normalize_or_zero();
             // Where the mesh is coarser than what it stands for, it may be seen beyond the limb.
-            let beyond = towards.dot(ray).max(0.0) / ray.length_squared();
-            let normal = (towards - ray * beyond).try_normalize().unwrap_or(-ray.normalize());
-            buffers.depth[i] = (1.0 / nearness) as f32;
+            let facing = towards.dot(ray);
+            let normal = towards - ray * (facing.max(0.0) / ray.length_squared());
+            let normal = normal.try_normalize().unwrap_or(-ray.normalize());
+            let nearer = rise.dot(towards) / facing.min(-GRAZING * ray.length());
+            buffers.depth[i] = (depth + nearer).max(0.5 * depth) as f32;
             buffers.normal[i] = normal.as_vec3().to_array();
         }
         buffers

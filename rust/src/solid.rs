@@ -19,11 +19,13 @@
 
 mod crossings;
 mod faces;
+mod finer;
 
 use crate::dispatch::for_each_instruction_set;
 use crate::voxel::{BitGrid, SIDE};
 use crossings::{COLUMNS, Crossings, Vote};
 pub(crate) use crossings::{ONE, Point};
+pub use finer::Finer;
 use glam::DVec3;
 use std::collections::HashSet;
 
@@ -59,32 +61,6 @@ pub enum SolidError {
 /// [`SolidError`] for no faces, an index out of range, a coordinate that is not finite, or no extent.
 pub fn voxelize(vertices: &[[f64; 3]], faces: &[[i64; 3]]) -> Result<BitGrid, SolidError> {
     Ok(inside(&Frame::around(vertices, faces)?, vertices, faces))
-}
-
-/// Voxels along each side of a finer grid.
-pub const FINER: usize = 2 * SIDE;
-
-/// The same in a grid of 128^3 over the same cube: 0 or 1, in the order (x, y, z).
-///
-/// # Errors
-///
-/// As [`voxelize`].
-pub fn voxelize_finer(vertices: &[[f64; 3]], faces: &[[i64; 3]]) -> Result<Vec<f32>, SolidError> {
-    let frame = Frame::around(vertices, faces)?;
-    let mut fine = vec![0.0; FINER * FINER * FINER];
-    let mut coarse = vec![0; crate::voxel::CELLS];
-    for part in 0..8 {
-        // Every other voxel along each axis: the centres of a coarse grid, a quarter of its voxels off.
-        let offset = [part >> 2 & 1, part >> 1 & 1, part & 1];
-        let moved = frame.moved(offset.map(|o| 0.25 - 0.5 * o as f64));
-        inside(&moved, vertices, faces).write_bytes(&mut coarse);
-        for (column, bytes) in coarse.chunks_exact(SIDE).enumerate() {
-            let (x, y) = (2 * (column / SIDE) + offset[0], 2 * (column % SIDE) + offset[1]);
-            let line = &mut fine[(x * FINER + y) * FINER + offset[2]..];
-            line.iter_mut().step_by(2).zip(bytes).for_each(|(fine, &byte)| *fine = f32::from(byte));
-        }
-    }
-    Ok(fine)
 }
 
 /// What a mesh encloses of a grid.

@@ -1,4 +1,4 @@
-"""A mesh from elsewhere as a data set keeps it: placed in the world, cleaned, voxelised; and what was found on the way."""
+"""A mesh from elsewhere as a data set keeps it: placed in the world, cleaned, voxelised; and what was found there."""
 
 from __future__ import annotations
 
@@ -64,15 +64,11 @@ def place(vertices: NDArray[np.float64], faces: NDArray[np.int64], up: str, fron
         points, corners, cleaned = _clean(turned @ turn("y", ahead).T, faces)
         front = _named(turn(up).T @ turn("y", ahead)[0])
     world = _voxels(points, corners)
-    edges = _edges(corners)
     filled = _filled(points, corners, world)
     found |= cleaned | {
         "front": front,
         "faces": len(corners),
-        "open_edges": edges[0],
-        "crowded_edges": edges[1],
-        "turned_edges": edges[2],
-        "closed": edges == (0, 0, 0),
+        **_edges(corners),
         "occupied": float(world.mean()),
         "symmetry": round(symmetry(world), 4),
         "filled": round(filled, 4),
@@ -112,10 +108,13 @@ def _clean(
     corners = names[faces].reshape(-1, 3)
     flat = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
     corners = corners[~flat]
-    _, first = np.unique(np.sort(corners, axis=1), axis=0, return_index=True)
-    kept = corners[np.sort(first)]
-    if len(kept) == 0:
+    if len(corners) == 0:
         raise LeftOutError("no face has an area")
+    kept = corners
+    if not _edges(corners)["closed"]:
+        # Two solids that share a face are closed; else one of both sides is enough.
+        _, first = np.unique(np.sort(corners, axis=1), axis=0, return_index=True)
+        kept = corners[np.sort(first)]
     found = {
         "merged_vertices": len(placed) - len(points),
         "degenerate_faces": int(flat.sum()),
@@ -131,14 +130,20 @@ def _voxels(points: NDArray[np.float32], corners: NDArray[np.int32]) -> NDArray[
     return world
 
 
-def _edges(corners: NDArray[np.int32]) -> tuple[int, int, int]:
-    """How many edges have one face, more than two faces, and two faces that run along them the same way."""
+def _edges(corners: NDArray[np.int32]) -> dict[str, Any]:
+    """Edges that have a single face, and those whose two faces disagree which way round they are.
+
+    And whether the mesh is closed: each edge is run along as often one way as the other (rust/src/solid.rs).
+    """
     runs = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
-    sorted_runs = np.sort(runs, axis=1)
-    _, which, faces = np.unique(sorted_runs, axis=0, return_inverse=True, return_counts=True)
+    _, which, faces = np.unique(np.sort(runs, axis=1), axis=0, return_inverse=True, return_counts=True)
     forward = np.bincount(which.ravel(), runs[:, 0] < runs[:, 1], len(faces))
-    turned = (faces == 2) & (forward != 1)
-    return int((faces == 1).sum()), int((faces > 2).sum()), int(turned.sum())
+    balanced = 2 * forward == faces
+    return {
+        "open_edges": int((faces == 1).sum()),
+        "turned_edges": int(((faces == 2) & ~balanced).sum()),
+        "closed": bool(balanced.all()),
+    }
 
 
 def _filled(points: NDArray[np.float32], corners: NDArray[np.int32], world: NDArray[np.uint8]) -> float:

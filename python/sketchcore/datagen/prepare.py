@@ -57,6 +57,19 @@ class Preparation:
             raise ValueError(f"split must be three shares that sum up to 1, such as 0.8,0.1,0.1; got {self.split}")
 
 
+def shares_of(text: str) -> tuple[float, float, float]:
+    """Shares as the command line takes them: "0.8,0.1,0.1".
+
+    Raises:
+        ValueError: for anything but three numbers.
+    """
+    try:
+        first, second, third = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ValueError(f"split must be three shares that sum up to 1, such as 0.8,0.1,0.1; got {text!r}") from None
+    return first, second, third
+
+
 @dataclass(frozen=True)
 class Report:
     """What `prepare` made of a folder.
@@ -146,7 +159,10 @@ def prepare(
     with _Workers(jobs or os.cpu_count() or 1) as workers:
         ups = _upwards(folder, files, told, workers)
         kinds = {(kind["folder"], kind["suffix"]): kind["up"] for kind in ups}
-        todo, objects, left_out, first = [], [], [], {}
+        todo: list[tuple[_Job, dict[str, Any], dict[str, Any]]] = []
+        objects: list[dict[str, Any]] = []
+        left_out: list[dict[str, str]] = []
+        first: dict[str, str] = {}
         front = None if told.front == "auto" else told.front
         for path in files:
             name = path.relative_to(folder).as_posix()

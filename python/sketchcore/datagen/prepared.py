@@ -25,7 +25,7 @@ from safetensors.numpy import load, save
 from sketchcore import _core
 from sketchcore.atomic import write_atomically
 from sketchcore.datagen.generate import Batch
-from sketchcore.grids import CREASE_DEGREES, frusta_of_mesh
+from sketchcore.grids import CREASE_DEGREES
 
 INDEX = "dataset.json"
 OBJECTS = "objects"
@@ -56,7 +56,7 @@ class MeshObject:
 def save_object(path: Path, item: MeshObject, found: Mapping[str, Any]) -> None:
     """Writes an object, whole or not at all, and what is known of it."""
     packed = np.packbits(item.world, axis=2, bitorder="little")
-    arrays = {"vertices": item.vertices, "faces": item.faces, "world": packed}
+    arrays: dict[str, NDArray[Any]] = {"vertices": item.vertices, "faces": item.faces, "world": packed}
     write_atomically(path, save(arrays, metadata={"found": json.dumps(dict(found))}))
 
 
@@ -198,7 +198,7 @@ class Prepared:
             world[i] = item.world
             cameras[i] = _core.draw_mesh_views(*item.packed, CREASE_DEGREES, text, seed, first + i, drawings[i])
             if frusta:
-                cells[i] = frusta_of_mesh(*item.packed, cameras[i])
+                cells[i] = _core.mesh_frusta(*item.packed, cameras[i], 2)
         return Batch(drawings, world, cells, cameras, ())
 
 

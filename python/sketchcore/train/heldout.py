@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sketchcore.datagen.generate import generate
+from sketchcore.datagen.prepared import Prepared
 from sketchcore.nets.models import Model
 from sketchcore.nets.sketches import Sketches
 from sketchcore.volume import iou
@@ -15,9 +16,17 @@ SEED = 2**63
 """Training seeds lie below; held-out shapes have this one."""
 
 
-def heldout_iou(model: Model, views: Sequence[int], rounds: int = 1, shapes: int = 16) -> list[float]:
-    """Mean IoU in the world grid after some rounds over exact drawings, for each number of views."""
-    batch = generate(SEED, shapes, views=max(views))
+def heldout_iou(
+    model: Model, views: Sequence[int], rounds: int = 1, shapes: int = 16, data: Prepared | None = None
+) -> list[float]:
+    """Mean IoU in the world grid after some rounds over exact drawings, for each number of views.
+
+    Of shapes that the generator makes, or of as many from the validation split of a data set.
+    """
+    if data is None:
+        batch = generate(SEED, shapes, views=max(views))
+    else:
+        batch = data.batch("val", SEED, shapes := min(shapes, data.count("val")), views=max(views))
     scores = []
     for count in views:
         each = []

@@ -14,6 +14,7 @@ from torch import Tensor, nn
 
 from sketchcore import _core
 from sketchcore.datagen.generate import Batch, generate
+from sketchcore.datagen.prepared import Prepared
 from sketchcore.nets.models import PaperModel
 from sketchcore.nets.multiscale import MultiscaleNet
 from sketchcore.nets.precision import autocast, place, unit
@@ -25,12 +26,14 @@ from sketchcore.train.presets import Preset
 from sketchcore.train.truth import in_camera_grids
 
 
-def _batches(preset: Preset, seed: int, first: int, views: int) -> Ahead[Batch]:
-    return Ahead(partial(_batch, preset, seed, first, views), 0, 1, preset.threads)
+def _batches(preset: Preset, seed: int, first: int, views: int, data: Prepared | None) -> Ahead[Batch]:
+    return Ahead(partial(_batch, preset, seed, first, views, data), 0, 1, preset.threads)
 
 
-def _batch(preset: Preset, seed: int, first: int, views: int, number: int) -> Batch:
+def _batch(preset: Preset, seed: int, first: int, views: int, data: Prepared | None, number: int) -> Batch:
     first += number * preset.batch
+    if data is not None:
+        return data.batch("train", seed, preset.batch, first=first, views=views, config=preset.generator, frusta=True)
     return generate(seed, preset.batch, first=first, views=views, config=preset.generator, threads=1)
 
 
@@ -42,12 +45,20 @@ class SingleStage:
         samples: how many shapes have been used.
     """
 
-    def __init__(self, preset: Preset, seed: int, device: torch.device, samples: int, net: SingleViewNet) -> None:
+    def __init__(
+        self,
+        preset: Preset,
+        seed: int,
+        device: torch.device,
+        samples: int,
+        net: SingleViewNet,
+        data: Prepared | None = None,
+    ) -> None:
         self.model = place(net, device)
         self.samples = 0
         self._truth = preset.truth
-        self._device = device
-        self._batches = _batches(preset, seed, samples, views=1)
+        self._device, self._data = device, data
+        self._batches = _batches(preset, seed, samples, views=1, data=data)
 
     @property
     def waited(self) -> float:
@@ -66,7 +77,7 @@ class SingleStage:
     def measure(self, net: nn.Module) -> float:
         """The held-out IoU of a network like the model: from one drawing."""
         assert isinstance(net, PaperNet | MultiscaleNet)
-        return heldout_iou(SingleViewModel(net, self._device), views=(1,), rounds=0)[0]
+        return heldout_iou(SingleViewModel(net, self._device), views=(1,), rounds=0, data=self._data)[0]
 
     def close(self) -> None:
         """Stops the threads."""
@@ -81,14 +92,22 @@ class UpdaterStage:
         samples: how many shapes have been used.
     """
 
-    def __init__(self, preset: Preset, seed: int, device: torch.device, samples: int, single: PaperNet) -> None:
+    def __init__(
+        self,
+        preset: Preset,
+        seed: int,
+        device: torch.device,
+        samples: int,
+        single: PaperNet,
+        data: Prepared | None = None,
+    ) -> None:
         self.model = place(PaperNet(updater=True, width=single.width), device)
         self.samples = 0
         self._truth = preset.truth
         self._single = single
         self._predict = SingleViewModel(single, device).predict
-        self._device = device
-        self._batches = _batches(preset, seed, samples, views=2)
+        self._device, self._data = device, data
+        self._batches = _batches(preset, seed, samples, views=2, data=data)
 
     @property
     def waited(self) -> float:
@@ -115,7 +134,7 @@ class UpdaterStage:
     def measure(self, net: nn.Module) -> float:
         """The held-out IoU of a network like the model: from two drawings, after a round."""
         assert isinstance(net, PaperNet)
-        return heldout_iou(PaperModel(self._single, net, self._device), views=(2,), rounds=1)[0]
+        return heldout_iou(PaperModel(self._single, net, self._device), views=(2,), rounds=1, data=self._data)[0]
 
     def close(self) -> None:
         """Stops the threads."""

@@ -1,6 +1,6 @@
 //! Triangle meshes: their voxels, and what cameras see of them.
 
-use super::arrays::{camera_of, check_size, checked, checked_mut, filled};
+use super::arrays::{camera_of, cameras_of, check_rays, check_size, checked, checked_mut, filled, grid};
 use super::views::{BufferArrays, buffer_arrays};
 use super::volumes::voxels;
 use crate::batch::{SampleConfig, draw_views};
@@ -8,11 +8,12 @@ use crate::buffers::Buffers;
 use crate::camera::{Camera, IMAGE, PACKED, VIEWPOINTS};
 use crate::error::CoreError;
 use crate::lines::LineConfig;
-use crate::solid::{self, FINER};
+use crate::solid::{self, Finer};
 use crate::subject::Subject;
 use crate::surface::Surface;
+use crate::voxel::CELLS;
 use numpy::{
-    IntoPyArray, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn,
+    IntoPyArray, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn,
     PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
@@ -40,13 +41,23 @@ pub fn voxelize_mesh<'py>(
 }
 
 #[pyfunction]
-pub fn voxelize_mesh_finer<'py>(
+pub fn mesh_frusta<'py>(
     py: Python<'py>,
     vertices: PyReadonlyArrayDyn<'py, f64>,
     faces: PyReadonlyArrayDyn<'py, i64>,
-) -> PyResult<Bound<'py, PyArray3<f32>>> {
+    cameras: PyReadonlyArrayDyn<'py, f64>,
+    rays: i64,
+) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
     let (vertices, faces) = faces_of(&vertices, &faces)?;
-    py.detach(|| solid::voxelize_finer(vertices, faces))?.into_pyarray(py).reshape([FINER; 3])
+    let (cameras, rays) = (cameras_of(&cameras)?, check_rays(rays)?);
+    let mut cells = vec![0; cameras.len() * CELLS];
+    py.detach(|| {
+        let finer = Finer::of_mesh(vertices, faces)?;
+        let grids = cells.chunks_exact_mut(CELLS).zip(&cameras);
+        grids.for_each(|(cells, camera)| finer.fill_frustum(camera, rays, cells));
+        Ok::<_, PyErr>(())
+    })?;
+    grid(py, cells, &[cameras.len()])
 }
 
 #[pyfunction]

@@ -1,6 +1,6 @@
 //! What a camera sees of a shape or of a volume.
 
-use super::arrays::{all_finite, camera_of, check_size, checked, filled, grid, shape_of};
+use super::arrays::{all_finite, camera_of, check_rays, check_size, checked, filled, grid, shape_of};
 use crate::buffers::{Buffers, fill_frustum};
 use crate::camera::{Camera, DISTANCE, IMAGE, PACKED, VIEWPOINTS};
 use crate::lines::{LineConfig, detect};
@@ -27,10 +27,7 @@ pub fn frustum<'py>(
     rays: i64,
 ) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
     let (shape, camera) = (shape_of(&shape)?, camera_of(&camera)?);
-    if !(1..=16).contains(&rays) {
-        return Err(PyValueError::new_err(format!("rays must lie between 1 and 16, got {rays}")));
-    }
-    let rays = rays as usize;
+    let rays = check_rays(rays)?;
     let mut cells = vec![0; CELLS];
     py.detach(|| fill_frustum(&shape, &camera, rays, &mut cells))?;
     grid(py, cells, &[])

@@ -83,15 +83,12 @@ fn no_ray_slips_through() {
 #[test]
 fn faces_may_reach_behind_the_eye() {
     // A floor under the eye, which stands in its middle and looks level.
-    let floor = |y: f64| [[-1.0, y, -1.0], [1.0, y, -1.0], [1.0, y, 1.0], [-1.0, y, 1.0]];
-    let vertices: Vec<_> = floor(-1.0).into_iter().chain(floor(1.0)).collect();
-    let surface = Surface::new(&vertices, &[[0, 1, 2], [0, 2, 3], [4, 4, 6]], CREASE_DEGREES).unwrap();
+    let vertices = [[-1.0, 0.0, -1.0], [1.0, 0.0, -1.0], [1.0, 0.0, 1.0], [-1.0, 0.0, 1.0]];
+    let surface = Surface::new(&vertices, &[[0, 1, 2], [0, 2, 3], [1, 1, 3]], CREASE_DEGREES).unwrap();
     assert_eq!(surface.faces.len(), 2, "a face without area is left out");
     let ahead = Camera::orbit(0.0, 0.0, 0.0, 2.0);
     let camera = Camera::new(DVec3::ZERO, ahead.axes, 90.0, 0.1, 3.0).unwrap();
     let seen = Buffers::of_mesh(&surface, &camera, 64).unwrap();
-    let height = 0.0; // what is named spans a flat square: its middle is the floor
-    assert_eq!(surface.bounds().0.y, height);
     let above = Camera::new(DVec3::new(0.0, 0.1, 0.0), ahead.axes, 90.0, 0.1, 3.0).unwrap();
     assert!(seen.depth.iter().all(|d| d.is_infinite()), "edge-on");
     let seen = Buffers::of_mesh(&surface, &above, 64).unwrap();
