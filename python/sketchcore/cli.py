@@ -205,12 +205,16 @@ def evaluate(
     drawings: Annotated[
         list[Path] | None, typer.Option("--drawings", help="Folders of people's drawings, for the part drawings.")
     ] = None,
+    data: Annotated[
+        Path | None,
+        typer.Option("--data", help="Data set (sketchcore prepare) whose test split accuracy is measured on instead."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="Folder for PART.json and PART.png, or drawings' pictures.")
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Measure a network: on the fixed test set, or on people's drawings.
+    """Measure a network: on the fixed test set, on meshes of one's own, or on people's drawings.
 
     accuracy: IoU by views and rounds, concavities, carving, ceiling, viewpoint. convergence: ten rounds, and orders of
     the drawings. robustness: faulty drawings. cost: time and memory. drawings: outlines of people's drawings, pieces,
@@ -223,7 +227,7 @@ def evaluate(
         if part not in PARTS:
             raise ValueError(f"unknown part {part!r}; the parts are {', '.join(PARTS)}")
         with _bar(part) as show:
-            report = measure_part(part, model, shapes, drawings, out, show)
+            report = measure_part(part, model, shapes, drawings, out, show, data)
         if out is not None:
             write_part(part, report, out)
     if as_json:
