@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scipy import ndimage
 from typer.testing import CliRunner
 
 import deadly
@@ -41,6 +42,7 @@ def lying(mesh, up, front):
     return turned
 
 
+TOLD = Preparation(split=(0.5, 0.25, 0.25), thin=False)
 CHAIRS = [chair(back, seat) for back in (0.4, 0.5, 0.6) for seat in (0.4, 0.45)]
 
 
@@ -64,7 +66,7 @@ def dataset(tmp_path_factory):
     (folder / "dot.obj").write_text("v 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 2 3\n")
     shutil.copy(folder / "deep" / "chair 0.obj", folder / "deep" / "twin.obj")
     (folder / "readme.txt").write_text("no mesh")
-    report = prepare(folder, out, Preparation(split=(0.5, 0.25, 0.25)), jobs=1)
+    report = prepare(folder, out, TOLD, jobs=1)
     return folder, out, report
 
 
@@ -119,16 +121,16 @@ def test_a_second_run_makes_nothing_and_mends_what_is_damaged(dataset, tmp_path)
     folder, out, report = dataset
     copy = tmp_path / "copy"
     shutil.copytree(out, copy)
-    again = prepare(folder, copy, Preparation(split=(0.5, 0.25, 0.25)), jobs=1)
+    again = prepare(folder, copy, TOLD, jobs=1)
     assert again.made == 0
     assert again.objects == report.objects
     victim = copy / "objects" / report.objects[2]["file"]
     victim.write_bytes(victim.read_bytes()[:-7])
     (copy / "dataset.json").unlink()
-    mended = prepare(folder, copy, Preparation(split=(0.5, 0.25, 0.25)), jobs=1)
+    mended = prepare(folder, copy, TOLD, jobs=1)
     assert mended.made == 1
     assert mended.objects == report.objects
-    other = prepare(folder, copy, Preparation(up="z", front="-y", split=(1, 0, 0)), jobs=1)
+    other = prepare(folder, copy, Preparation(up="z", front="-y", split=(1, 0, 0), thin=False), jobs=1)
     assert {item["split"] for item in other.objects} == {"train"}
     assert other.made == len(report.objects)
 
@@ -138,7 +140,7 @@ def test_splits_do_not_depend_on_other_files(dataset, tmp_path):
     fewer = tmp_path / "fewer"
     shutil.copytree(folder / "deep", fewer / "deep")
     (fewer / "deep" / "chair 3.ply").unlink()
-    made = prepare(fewer, tmp_path / "out", Preparation(split=(0.5, 0.25, 0.25)), jobs=1)
+    made = prepare(fewer, tmp_path / "out", TOLD, jobs=1)
     before = {item["sha256"]: item["split"] for item in report.objects}
     assert made.objects
     assert all(before[item["sha256"]] == item["split"] for item in made.objects)
@@ -147,7 +149,7 @@ def test_splits_do_not_depend_on_other_files(dataset, tmp_path):
 @pytest.mark.slow
 def test_several_processes_say_the_same_as_one(dataset, tmp_path):
     folder, _, report = dataset
-    parallel = prepare(folder, tmp_path / "out", Preparation(split=(0.5, 0.25, 0.25)), jobs=2)
+    parallel = prepare(folder, tmp_path / "out", TOLD, jobs=2)
     assert parallel.objects == report.objects
     assert parallel.left_out == report.left_out
 
@@ -200,7 +202,41 @@ def test_what_is_taken_away_is_counted():
         place(mesh.vertices, mesh.faces + 7, "y", "x")
     thin = trimesh.creation.box((1, 1, 1e-3))
     with pytest.raises(LeftOutError, match=r"encloses nothing|too thin"):
-        place(np.array(thin.vertices), np.array(thin.faces), "y", "x")
+        place(np.array(thin.vertices), np.array(thin.faces), "y", "x", thin=False)
+
+
+def placed_by(mesh, thin):
+    return place(np.array(mesh.vertices), np.array(mesh.faces), "y", "x", thin)
+
+
+def test_what_is_thinner_than_a_voxel_is_filled():
+    # A sheet is one voxel thick, wherever it lies, and has no holes.
+    for x in (0.0, 0.003, 0.011):
+        sheet = trimesh.Trimesh([[0, 0, 0], [0, 1, 0], [0, 1, 0.6], [0, 0, 0.6]], [[0, 1, 2], [0, 2, 3]])
+        mesh = trimesh.util.concatenate([sheet, trimesh.creation.box(bounds=[[x - 0.2, 0, 0], [x - 0.1, 0.1, 0.6]])])
+        made = placed_by(mesh, True)
+        slab = made.world[:, 12:58].sum(axis=0)
+        assert set(np.unique(slab[:, 18:46])) == {1}
+        assert made.found["thin_voxels"] > 1000
+        assert made.found["filled"] == 1
+    # A tilted rod hangs together; nothing is added to what voxels show.
+    rod = trimesh.creation.cylinder(0.004, segment=[[0, 0, 0], [0.3, 1, 0.2]])
+    world = placed_by(rod, True).world
+    assert ndimage.label(world, np.ones((3, 3, 3)))[1] == 1
+    assert 50 < world.sum() < 220
+    for solid in (CHAIRS[0], trimesh.creation.icosphere(3), trimesh.creation.cylinder(0.3, 1.0, sections=7)):
+        assert placed_by(solid, True).found["thin_voxels"] == 0
+
+
+def test_a_thin_wall_is_whole():
+    # A vessel whose wall is half a voxel: centres catch it here and there.
+    outer, inner = trimesh.creation.icosphere(4, 1.0), trimesh.creation.icosphere(4, 0.99)
+    inner.invert()
+    ball = trimesh.util.concatenate([outer, inner])
+    speckled, whole = placed_by(ball, False).world, placed_by(ball, True).world
+    hollow = ndimage.binary_fill_holes(whole) & (whole == 0)
+    assert not (ndimage.binary_fill_holes(speckled) & (speckled == 0)).sum() > 0.5 * hollow.sum()
+    assert hollow.sum() > 0.8 * 4 / 3 * np.pi * 26**3
 
 
 def test_a_scene_is_put_together(tmp_path):
@@ -286,7 +322,7 @@ def test_wrong_options_say_what_would_be_right(dataset, tmp_path):
 
 def test_the_command_line_prepares(dataset, tmp_path):
     folder, _, report = dataset
-    command = ["prepare", str(folder), "-o", str(tmp_path / "data"), "--split", "1,0,0", "--jobs", "1"]
+    command = ["prepare", str(folder), "-o", str(tmp_path / "data"), "--split", "1,0,0", "--jobs", "1", "--no-thin"]
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0
     assert f"{len(report.objects)} objects" in done.stdout

@@ -24,6 +24,7 @@ __all__ = [
     "lines",
     "mesh_buffers",
     "mesh_frusta",
+    "mesh_shares",
     "silhouettes",
     "to_camera_grid",
     "to_world_grid",
@@ -37,6 +38,7 @@ def voxelize(shape: NDArray[np.float64], out: NDArray[np.uint8] | None = None) -
 def voxelize_mesh(
     vertices: NDArray[np.float64], faces: NDArray[np.int64], out: NDArray[np.uint8] | None = None
 ) -> NDArray[np.uint8]: ...
+def mesh_shares(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.uint8]: ...
 def mesh_frusta(
     vertices: NDArray[np.float64], faces: NDArray[np.int64], cameras: NDArray[np.float64], rays: int
 ) -> NDArray[np.uint8]: ...

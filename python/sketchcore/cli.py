@@ -125,6 +125,10 @@ def prepare(
         str, typer.Option(help="Where the objects look, in the files' axes, beside --up; auto tells by their looks.")
     ] = "auto",
     split: Annotated[str, typer.Option(help="Shares for training, validation and tests.")] = "0.8,0.1,0.1",
+    thin: Annotated[
+        bool,
+        typer.Option("--thin/--no-thin", help="Fill what is thinner than a voxel; else it is missing, as in voxelize."),
+    ] = True,
     jobs: Annotated[int | None, typer.Option(help="Processes; the default is one a core.")] = None,
     as_json: Json = False,
 ) -> None:
@@ -138,7 +142,7 @@ def prepare(
         from sketchcore.datagen.prepare import Preparation, shares_of
         from sketchcore.datagen.prepare import prepare as prepare_meshes
 
-        told = Preparation(up, front, shares_of(split))
+        told = Preparation(up, front, shares_of(split), thin)
         with _bar("meshes", quiet=as_json) as show:
             report = prepare_meshes(folder, out, told, jobs=jobs, progress=show)
     typer.echo(json.dumps(report.to_dict()) if as_json else report.summary())

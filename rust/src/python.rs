@@ -46,7 +46,7 @@ mod _core {
     #[pymodule_export]
     use super::lift::{lift, lift_taps, lift_transposed};
     #[pymodule_export]
-    use super::meshes::{draw_mesh, draw_mesh_views, mesh_buffers, mesh_frusta, voxelize_mesh};
+    use super::meshes::{draw_mesh, draw_mesh_views, mesh_buffers, mesh_frusta, mesh_shares, voxelize_mesh};
     #[pymodule_export]
     use super::samples::{default_config, generate};
     #[pymodule_export]

@@ -25,7 +25,7 @@ use crate::dispatch::for_each_instruction_set;
 use crate::voxel::{BitGrid, SIDE};
 use crossings::{COLUMNS, Crossings, Vote};
 pub(crate) use crossings::{ONE, Point};
-pub use finer::Finer;
+pub use finer::{Finer, shares};
 use glam::DVec3;
 use std::collections::HashSet;
 

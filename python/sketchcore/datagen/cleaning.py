@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sketchcore import _core
 from sketchcore.camera import VIEWPOINTS
+from sketchcore.datagen.thin import fill_thin
 from sketchcore.datagen.upright import facing, symmetry, turn
 from sketchcore.grids import CREASE_DEGREES
 
@@ -41,7 +42,9 @@ class LeftOutError(ValueError):
     """Why a mesh makes no object of a data set."""
 
 
-def place(vertices: NDArray[np.float64], faces: NDArray[np.int64], up: str, front: str | None) -> Placed:
+def place(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], up: str, front: str | None, thin: bool = True
+) -> Placed:
     """Turns, scales and centres a mesh, and takes away what is of no use in it.
 
     Args:
@@ -49,6 +52,7 @@ def place(vertices: NDArray[np.float64], faces: NDArray[np.int64], up: str, fron
         faces: int64 [m, 3].
         up: one of `upright.AXES`.
         front: likewise, in the file's axes; None to look for it (`upright.facing`).
+        thin: fill what falls between the voxels' centres (`thin.fill_thin`).
 
     Raises:
         LeftOutError: for a mesh without faces or extent, with an index out of range or coordinates that are not finite,
@@ -60,16 +64,17 @@ def place(vertices: NDArray[np.float64], faces: NDArray[np.int64], up: str, fron
     points, corners, cleaned = _clean(turned, faces)
     if front is None:
         # Which way it looks is read off the voxels.
-        ahead = facing(_voxels(points, corners))
+        ahead = facing(_voxels(points, corners, thin)[0])
         points, corners, cleaned = _clean(turned @ turn("y", ahead).T, faces)
         front = _named(turn(up).T @ turn("y", ahead)[0])
-    world = _voxels(points, corners)
+    world, added = _voxels(points, corners, thin)
     filled = _filled(points, corners, world)
     found |= cleaned | {
         "front": front,
         "faces": len(corners),
         **_edges(corners),
         "occupied": float(world.mean()),
+        "thin_voxels": added,
         "symmetry": round(symmetry(world), 4),
         "filled": round(filled, 4),
     }
@@ -123,11 +128,13 @@ def _clean(
     return points, np.ascontiguousarray(kept, np.int32), found
 
 
-def _voxels(points: NDArray[np.float32], corners: NDArray[np.int32]) -> NDArray[np.uint8]:
-    world = _core.voxelize_mesh(points.astype(np.float64), corners.astype(np.int64))
+def _voxels(points: NDArray[np.float32], corners: NDArray[np.int32], thin: bool) -> tuple[NDArray[np.uint8], int]:
+    """The voxels of a mesh, and how many of them are there for what is thinner than they are."""
+    solid = _core.voxelize_mesh(points.astype(np.float64), corners.astype(np.int64))
+    world = fill_thin(points, corners, solid) if thin else solid
     if not world.any():
         raise LeftOutError("encloses nothing: a sheet, or thinner than a voxel all over")
-    return world
+    return world, int(world.sum()) - int(solid.sum())
 
 
 def _edges(corners: NDArray[np.int32]) -> dict[str, Any]:

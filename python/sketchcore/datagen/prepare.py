@@ -40,11 +40,13 @@ class Preparation:
         up: which axis is up in the files, one of `upright.AXES`; "auto" to tell by their looks.
         front: which axis the objects look along, likewise.
         split: shares of the splits train, val and test.
+        thin: fill what is thinner than a voxel (`thin.fill_thin`); else it is missing, and sheets are left out.
     """
 
     up: str = "auto"
     front: str = "auto"
     split: tuple[float, float, float] = (0.8, 0.1, 0.1)
+    thin: bool = True
 
     def __post_init__(self) -> None:
         check_axis(self.up, ("auto", *AXES), "up")
@@ -104,6 +106,9 @@ class Report:
             "with vertices merged": sum(o["merged_vertices"] > 0 for o in self.objects),
             "with faces without area taken away": sum(o["degenerate_faces"] > 0 for o in self.objects),
             "with doubled faces taken away": sum(o["doubled_faces"] > 0 for o in self.objects),
+            "thinner than voxels in part (above 10 % of theirs)": sum(
+                o["thin_voxels"] > 0.1 * 64**3 * o["occupied"] for o in self.objects
+            ),
             "not symmetric about z = 0 (below 0.9)": sum(o["symmetry"] < 0.9 for o in self.objects),
         }
         lines += [f"  {count} {what}" for what, count in repairs.items() if count]
@@ -119,6 +124,7 @@ class _Job:
     name: str  # relative to the folder
     up: str
     front: str | None
+    thin: bool
     target: Path
 
 
@@ -176,13 +182,13 @@ def prepare(
             first[digest] = name
             up = kinds[_kind(folder, path)]
             target = out / OBJECTS / f"{_plain(name)}-{digest[:8]}.safetensors"
-            options = {"up": up, "asked_front": told.front, "format": VERSION}
+            options = {"up": up, "asked_front": told.front, "thin": told.thin, "format": VERSION}
             entry = {"file": target.name, "source": name, "sha256": digest, "split": _split(digest, told.split)}
             known = load_found(target)
             if known is not None and all(known.get(key) == value for key, value in options.items()):
                 objects.append(entry | known)
             else:
-                todo.append((_Job(path, name, up, front, target), entry, options))
+                todo.append((_Job(path, name, up, front, told.thin, target), entry, options))
         done, total = len(files) - len(todo), len(files)
         if progress is not None:
             progress(done, total)
@@ -272,7 +278,7 @@ def _make(task: tuple[_Job, dict[str, Any]]) -> dict[str, Any] | str:
     try:
         mesh = load_mesh(job.source)
         vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
-        made = place(vertices, faces, job.up, job.front)
+        made = place(vertices, faces, job.up, job.front, job.thin)
     except LeftOutError as reason:
         return str(reason)
     except (ValueError, OSError, MemoryError) as error:

@@ -199,6 +199,12 @@ class Prepared:
             cameras[i] = _core.draw_mesh_views(*item.packed, CREASE_DEGREES, text, seed, first + i, drawings[i])
             if frusta:
                 cells[i] = _core.mesh_frusta(*item.packed, cameras[i], 2)
+                thin = item.world & ~_core.voxelize_mesh(*item.packed) & 1
+                if thin.any():
+                    worlds = np.repeat(thin[None].astype(np.float32), views, axis=0)
+                    np.maximum(
+                        cells[i], np.rint(255 * _core.to_camera_grid(worlds, cameras[i])), cells[i], casting="unsafe"
+                    )
         return Batch(drawings, world, cells, cameras, ())
 
 

@@ -68,6 +68,18 @@ class ShapeExample(Example):
     shape: Shape
 
 
+@dataclass(frozen=True)
+class MeshExample(Example):
+    """One mesh of a data set; its truth is what it was prepared as, thin parts filled."""
+
+    prepared: NDArray[np.uint8]
+
+    @cached_property
+    def world(self) -> NDArray[np.uint8]:
+        """uint8 [64, 64, 64], the truth in the world grid."""
+        return self.prepared
+
+
 def count_shapes(shapes: int | None) -> int:
     """How many shapes those are: all for None.
 
@@ -102,7 +114,7 @@ def load_testset(
 
 def load_meshes(
     data: Prepared, shapes: int | None = None, progress: Callable[[int, int], None] | None = None
-) -> Iterator[Example]:
+) -> Iterator[MeshExample]:
     """The first `shapes` objects of a data set's test split, all for None, each with four cameras of its own.
 
     The cameras are the generator's: the first one of the eight viewpoints, the others distinct ones of the 13, each
@@ -124,6 +136,6 @@ def load_meshes(
         cameras = data.batch("test", 0, 1, first=i, views=4).cameras[0]
         # Displaced cameras are turned as their viewpoints are.
         off = {name: abs(VIEWPOINTS[name].rotation - cameras[0].rotation).max() for name in QUARTER_VIEWS}
-        yield Example(mesh, tuple(cameras), min(off, key=lambda name: off[name]))
+        yield MeshExample(mesh, tuple(cameras), min(off, key=lambda name: off[name]), item.world)
         if progress is not None:
             progress(i + 1, count)

@@ -40,6 +40,18 @@ pub fn voxelize_mesh<'py>(
     voxels(py, out, || Ok(solid::voxelize(vertices, faces)?))
 }
 
+/// Of 64 points of each voxel, how many are inside: uint8 [64, 64, 64].
+#[pyfunction]
+pub fn mesh_shares<'py>(
+    py: Python<'py>,
+    vertices: PyReadonlyArrayDyn<'py, f64>,
+    faces: PyReadonlyArrayDyn<'py, i64>,
+) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
+    let (vertices, faces) = faces_of(&vertices, &faces)?;
+    let counts = py.detach(|| solid::shares(vertices, faces))?;
+    grid(py, counts, &[])
+}
+
 #[pyfunction]
 pub fn mesh_frusta<'py>(
     py: Python<'py>,

@@ -10,6 +10,26 @@ const FINE: usize = 2 * SIDE;
 /// Places along depth at which a cell of a camera grid is looked at.
 const DEPTHS: usize = 4;
 
+/// Samples of a voxel along each axis that its share is measured by.
+const SAMPLES: usize = 4;
+
+/// How many of 4 x 4 x 4 evenly spaced points of each voxel a mesh encloses, in the order (x, y, z).
+///
+/// # Errors
+///
+/// As [`super::voxelize`].
+pub fn shares(vertices: &[[f64; 3]], faces: &[[i64; 3]]) -> Result<Vec<u8>, SolidError> {
+    let frame = Frame::around(vertices, faces)?;
+    let (mut counts, mut bytes) = (vec![0; CELLS], vec![0; CELLS]);
+    for part in 0..SAMPLES.pow(3) {
+        let offset = [part / SAMPLES / SAMPLES, part / SAMPLES % SAMPLES, part % SAMPLES];
+        let moved = frame.moved(offset.map(|o| 0.5 - (o as f64 + 0.5) / SAMPLES as f64));
+        inside(&moved, vertices, faces).write_bytes(&mut bytes);
+        counts.iter_mut().zip(&bytes).for_each(|(count, byte)| *count += byte);
+    }
+    Ok(counts)
+}
+
 /// 128^3 voxels over the world grid's cube: 0 or 1, in the order (x, y, z).
 pub struct Finer(Vec<u8>);
 
@@ -81,13 +101,36 @@ for_each_instruction_set! {
 mod tests {
     use super::*;
 
+    /// A box of which the first side is the largest.
+    fn cuboid(sides: [f64; 3]) -> (Vec<[f64; 3]>, Vec<[i64; 3]>) {
+        let corner = |i: usize| [0, 1, 2].map(|a| sides[a] * f64::from((i >> a & 1) as u32));
+        let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        let faces = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        ((0..8).map(corner).collect(), faces)
+    }
+
+    #[test]
+    fn shares_are_those_of_a_box() {
+        // 53.33 voxels long, 32.5 high, 20.25 deep, in the middle of the grid.
+        let (vertices, faces) = cuboid([1.0, 32.5 * 1.2 / 64.0, 20.25 * 1.2 / 64.0]);
+        let counts = shares(&vertices, &faces).unwrap();
+        let along = |i: usize, half: f64| {
+            (0..4).filter(|s| ((i * 4 + s) as f64 / 4.0 + 0.125 - 32.0).abs() < half).count()
+        };
+        for (i, &count) in counts.iter().enumerate() {
+            let [x, y, z] = [i / SIDE / SIDE, i / SIDE % SIDE, i % SIDE];
+            let expected = along(x, 0.5 * 64.0 / 1.2) * along(y, 16.25) * along(z, 10.125 + 1e-9);
+            // The surface along z passes through samples: either side will do.
+            let other = along(x, 0.5 * 64.0 / 1.2) * along(y, 16.25) * along(z, 10.125 - 1e-9);
+            assert!((other.min(expected)..=other.max(expected)).contains(&usize::from(count)), "{x} {y} {z}");
+        }
+    }
+
     #[test]
     fn a_box_fills_its_cells() {
         // A box as wide as the world's 1 / 1.2 each way, seen from the front: slice, row and column bounds are known.
-        let corner = |i: usize| [0, 1, 2].map(|a| f64::from((i >> a & 1) as u32));
-        let sides = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-        let faces: Vec<_> = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        let finer = Finer::of_mesh(&(0..8).map(corner).collect::<Vec<_>>(), &faces).unwrap();
+        let (vertices, faces) = cuboid([1.0; 3]);
+        let finer = Finer::of_mesh(&vertices, &faces).unwrap();
         let camera = Camera::orbit(0.0, 0.0, 0.0, 2.0);
         let mut out = vec![0; CELLS];
         finer.fill_frustum(&camera, 2, &mut out);
