@@ -1,10 +1,17 @@
-"""What cameras see of meshes: against a plain ray caster, against shapes that the meshes stand for, by formulas."""
+"""What cameras see of meshes: against a plain ray caster, against shapes that the meshes stand for, by formulas.
+
+Golden images are made anew as those of tests/test_lines.py are, and looked at.
+"""
+
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image
 from scipy import ndimage
 
 import reference
@@ -16,6 +23,7 @@ from sketchcore.grids import buffers, draw, frustum, to_camera_grid, voxelize
 from sketchcore.shape import Cuboid, Cylinder, Shape
 from test_solid import in_place, parts
 
+GOLDEN = Path(__file__).parent / "golden"
 SIZE = 64
 FAR = 0.5 / 1.2
 
@@ -131,6 +139,42 @@ def test_drawing_and_voxels_agree(mesh, name):
     filled = ndimage.binary_closing(filled, np.ones((3, 3)), iterations=4)
     if ndimage.binary_opening(world, np.ones((3, 3, 3))).sum() > 0.9 * world.sum():
         assert (filled & seen).sum() > 0.9 * seen.sum()
+
+
+def vase(sections):
+    """A vessel of few facets: a foot, a round belly, a neck, a lip, and a wall that is open inside."""
+    outside = [(0, 0), (0.28, 0), (0.24, 0.06), (0.36, 0.25), (0.42, 0.45), (0.36, 0.65), (0.2, 0.8), (0.17, 0.9)]
+    inside = [(0.25, 1.0), (0.22, 1.0), (0.14, 0.88), (0.17, 0.78), (0.32, 0.63), (0.37, 0.45), (0.2, 0.1), (0, 0.08)]
+    mesh = trimesh.creation.revolve(np.array(outside + inside, float), sections=sections)
+    return mesh.apply_transform(trimesh.geometry.align_vectors([0, 0, 1], [0, 1, 0]))
+
+
+def stool():
+    """A round seat on four slanted legs of six sides, with a ring: parts that run into each other."""
+    ends = [((x, 0, z), (0.7 * x, 0.6, 0.7 * z)) for x in (-0.25, 0.25) for z in (-0.25, 0.25)]
+    legs = [trimesh.creation.cylinder(0.03, segment=np.array(end), sections=6) for end in ends]
+    ring = trimesh.creation.torus(0.3, 0.015, major_sections=24, minor_sections=8)
+    ring.apply_transform(trimesh.geometry.align_vectors([0, 0, 1], [0, 1, 0])).apply_translation((0, 0.2, 0))
+    return trimesh.util.concatenate([*legs, ring, cylinder(0.3, 0.1, sections=20, center=(0, 0.62, 0))])
+
+
+MESHES = {"vase-quarter-037": vase(16), "vase-front": vase(16), "stool-quarter-142": stool()}
+
+
+@pytest.mark.parametrize("scene", MESHES)
+def test_golden_images_of_meshes(scene):
+    mesh, name = MESHES[scene], scene.split("-", 1)[1]
+    drawing = draw(mesh, VIEWPOINTS[name])
+    path = GOLDEN / f"{scene}.png"
+    if os.environ.get("SKETCHCORE_UPDATE_GOLDEN"):
+        Image.fromarray(255 - drawing).save(path, optimize=True)
+    with Image.open(path) as image:
+        expected = 255 - np.asarray(image)
+    assert (drawing != expected).sum() <= 256**2 // 10_000
+    # The background does not get in: outlines are closed.
+    labels, _ = ndimage.label(drawing == 0)
+    outside = labels == labels[0, 0]
+    assert not (outside & np.isfinite(buffers(mesh, VIEWPOINTS[name])[0])).any()
 
 
 def test_a_mesh_goes_the_same_way_as_its_voxels():
