@@ -8,6 +8,7 @@
 
 use crate::solid::{Frame, ONE, Point, SolidError};
 use glam::DVec3;
+use std::collections::HashMap;
 
 /// Edges at which a mesh bends by less are round: more than the 36 degrees of ten facets, less than an octagon's 45.
 pub const CREASE_DEGREES: f64 = 40.0;
@@ -123,6 +124,24 @@ fn merged(points: &[Point]) -> (Vec<usize>, usize) {
     (same, count)
 }
 
+/// Of the faces around a vertex, more than so many are taken together where their normals are about the same.
+const MANY: usize = 64;
+
+/// Normals that are the same to about a hundredth, as one of them, and the sum of what they weigh: the hub of a wheel of
+/// thousands of spokes would else compare each to all.
+fn grouped(each: impl Iterator<Item = (DVec3, DVec3)>) -> Vec<(DVec3, DVec3)> {
+    let mut groups: Vec<(DVec3, DVec3)> = Vec::new();
+    let mut named = HashMap::new();
+    for (normal, weight) in each {
+        let group = *named.entry((normal * 100.0).round().as_ivec3()).or_insert(groups.len());
+        match groups.get_mut(group) {
+            Some((_, sum)) => *sum += weight,
+            None => groups.push((normal, weight)),
+        }
+    }
+    groups
+}
+
 /// The normals at all corners. `names` says which vertex each of a face's corners is, `flat` is the faces' own normals.
 fn smooth(
     faces: &[[DVec3; 3]],
@@ -149,12 +168,14 @@ fn smooth(
     let weighted: Vec<DVec3> = around.iter().map(|&c| flat[c / 3] * weight(c)).collect();
     let mut normals = vec![[DVec3::ZERO; 3]; faces.len()];
     for v in 0..vertices {
-        let (here, weighted) = (&around[first[v]..first[v + 1]], &weighted[first[v]..first[v + 1]]);
+        let here = &around[first[v]..first[v + 1]];
+        let each = here.iter().zip(&weighted[first[v]..first[v + 1]]).map(|(&c, &w)| (flat[c / 3], w));
+        let groups = if here.len() > MANY { grouped(each) } else { each.collect() };
         for &corner in here {
             let own = flat[corner / 3];
             let mut sum = DVec3::ZERO;
-            for (&other, &w) in here.iter().zip(weighted) {
-                let cosine = own.dot(flat[other / 3]);
+            for &(normal, w) in &groups {
+                let cosine = own.dot(normal);
                 if cosine.abs() >= cos_crease - 1e-9 {
                     sum += if cosine < 0.0 { -w } else { w };
                 }
@@ -236,6 +257,26 @@ mod tests {
         }
         assert_eq!(count, firsts.len());
         assert!((20..500).contains(&count), "{count}");
+    }
+
+    #[test]
+    fn the_hub_of_many_spokes_is_as_smooth_as_that_of_few() {
+        // A flat cone: every normal at its tip is upright, however many faces meet there.
+        let cone = |spokes: i64| {
+            let rim = |i: i64| {
+                let angle = i as f64 / spokes as f64 * std::f64::consts::TAU;
+                [angle.cos(), 0.0, angle.sin()]
+            };
+            let mut vertices: Vec<_> = (0..spokes).map(rim).collect();
+            vertices.push([0.0, 0.2, 0.0]);
+            let faces: Vec<_> = (0..spokes).map(|i| [i, (i + 1) % spokes, spokes]).collect();
+            Surface::new(&vertices, &faces, CREASE_DEGREES).unwrap()
+        };
+        for spokes in [20, 60, 600, 20_000] {
+            let cone = cone(spokes);
+            let least = cone.normals.iter().map(|n| n[2].y.abs()).fold(1.0, f64::min);
+            assert!(least > 1.0 - 1e-6, "{spokes}: {least}");
+        }
     }
 
     #[test]

@@ -39,18 +39,23 @@ def fill_thin(
     # Beside what is thick nothing is thin: edges of boxes pass through voxels that are not half full.
     seen = np.where(maximum_filter(shares, 3) >= WHOLE, np.uint8(64), shares)
     corners = (places[faces] + 0.5) * SIDE
-    a, b, c = corners.swapaxes(0, 1)
+    # From the longest edge, a to b, row by row to the corner that is left.
+    edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=-1)
+    order = (edges.argmax(axis=1)[:, None] + np.arange(3)) % 3
+    a, b, c = np.take_along_axis(corners, order[:, :, None], axis=1).swapaxes(0, 1)
     across = np.cross(b - a, c - a)
-    length = np.linalg.norm(across, axis=1)
-    longest = np.linalg.norm([b - a, c - b, a - c], axis=-1).max(axis=0)
-    parts = np.ceil(longest / SPACING).astype(int)
+    area = np.linalg.norm(across, axis=1)
+    longest = edges.max(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        steps = np.ceil(np.stack([longest, area / longest], axis=1) / SPACING)
     filled = world.copy()
-    for n in np.unique(parts[length > 0]):
-        which = np.flatnonzero((parts == n) & (length > 0))
-        i, j = np.divmod(np.arange((n + 1) ** 2), n + 1)
-        weights = np.stack([i, j, n - i - j], axis=1)[i + j <= n] / n
+    for along, up in np.unique(steps[area > 0], axis=0).astype(int):
+        which = np.flatnonzero((steps == (along, up)).all(axis=1) & (area > 0))
+        s, t = (at.ravel() for at in np.meshgrid(np.arange(along + 1) / along, np.arange(up + 1) / up))
+        weights = np.stack([(1 - s) * (1 - t), s * (1 - t), t], axis=1)
         for some in np.array_split(which, 1 + len(which) * len(weights) // _MOST):
-            _fill(filled, seen, weights @ corners[some], across[some] / length[some, None])
+            ends = np.stack([a[some], b[some], c[some]], axis=1)
+            _fill(filled, seen, weights @ ends, across[some] / area[some, None])
     return filled
 
 
