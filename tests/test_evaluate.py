@@ -8,9 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+import trimesh
 from PIL import Image
 
 import sketchcore as sk
+from sketchcore.datagen.prepare import Preparation, prepare
+from sketchcore.datagen.prepared import Prepared
 from sketchcore.evaluate.accuracy import measure_accuracy
 from sketchcore.evaluate.comparison import compare
 from sketchcore.evaluate.convergence import measure_convergence
@@ -20,7 +23,7 @@ from sketchcore.evaluate.figure import Figure
 from sketchcore.evaluate.parts import PARTS, measure_part, write_part
 from sketchcore.evaluate.present import comparison_table
 from sketchcore.evaluate.robustness import measure_robustness
-from sketchcore.evaluate.testset import Example, load_testset
+from sketchcore.evaluate.testset import Example, load_meshes, load_testset
 from sketchcore.nets.sketches import Sketches
 from sketchcore.outline import outline_iou, pieces
 from sketchcore.rounds import Volume, update_rounds
@@ -178,6 +181,30 @@ def test_reports_are_written_compared_and_refused(tmp_path: Path) -> None:
         measure_part("drawings", shapes=3)
     with pytest.raises(ValueError, match="one or more --drawings"):
         measure_part("drawings")
+
+
+def test_meshes_are_a_test_set_as_well(tmp_path: Path) -> None:
+    (tmp_path / "meshes").mkdir()
+    for i in range(2):
+        trimesh.creation.box((1.0, 0.5 + 0.2 * i, 0.7)).export(tmp_path / "meshes" / f"{i}.ply")
+    prepare(tmp_path / "meshes", tmp_path / "boxes", Preparation(up="y", front="x", split=(0, 0, 1)), jobs=1)
+    data = Prepared(tmp_path / "boxes")
+    examples = list(load_meshes(data))
+    assert {e.viewpoint for e in examples} <= set(sk.QUARTER_VIEWS)
+    worlds = [data.load("test", number).world for number in range(2)]
+    assert all(any(np.array_equal(e.world, world) for world in worlds) for e in examples)
+    report = measure_accuracy(Oracle(examples), data=tmp_path / "boxes")
+    assert (report.shapes, report.source) == (2, "the test split of boxes")
+    assert report.network[0][0].mean > 0.9
+    assert "the test split of boxes" in str(PARTS["accuracy"].table(report).title)
+    with pytest.raises(ValueError, match="between 1 and 2"):
+        measure_accuracy(Oracle(examples), 3, data=tmp_path / "boxes")
+    with pytest.raises(ValueError, match="accuracy takes it"):
+        measure_part("robustness", data=tmp_path / "boxes")
+    write_part("accuracy", report, tmp_path)
+    (tmp_path / "other.json").write_text((tmp_path / "accuracy.json").read_text().replace("boxes", "chairs"))
+    with pytest.raises(ValueError, match="measured on the test split of boxes, the test split of chairs"):
+        compare([tmp_path / "accuracy.json", tmp_path / "other.json"])
 
 
 def test_bootstrap_interval_of_a_known_spread() -> None:

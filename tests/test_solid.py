@@ -186,10 +186,8 @@ def test_the_core_names_wrong_arrays():
 
 
 @pytest.mark.parametrize(
-    "value", [None, "mesh.obj", trimesh.Scene(BALL), BALL.vertices], ids=["none", "path", "scene", "array"]
+    "value", [None, b"mesh.obj", trimesh.Scene(BALL), BALL.vertices], ids=["none", "bytes", "scene", "array"]
 )
 def test_only_meshes_and_shapes_are_voxelized(value):
-    with pytest.raises(
-        TypeError, match=rf"expected a trimesh.Trimesh or a sketchcore.Shape, got {type(value).__name__}"
-    ):
+    with pytest.raises(TypeError, match=rf"a path to a mesh file or a sketchcore.Shape, got {type(value).__name__}"):
         voxelize(value)

@@ -13,6 +13,8 @@ __all__ = [
     "default_config",
     "draw",
     "draw_kinds",
+    "draw_mesh",
+    "draw_mesh_views",
     "evidence",
     "evidence_fields",
     "fit",
@@ -24,6 +26,9 @@ __all__ = [
     "lift_taps",
     "lift_transposed",
     "lines",
+    "mesh_buffers",
+    "mesh_frusta",
+    "mesh_shares",
     "random_style",
     "redraw",
     "silhouettes",
@@ -41,6 +46,33 @@ def voxelize(shape: NDArray[np.float64], out: NDArray[np.uint8] | None = None) -
 def voxelize_mesh(
     vertices: NDArray[np.float64], faces: NDArray[np.int64], out: NDArray[np.uint8] | None = None
 ) -> NDArray[np.uint8]: ...
+def mesh_shares(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.uint8]: ...
+def mesh_frusta(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], cameras: NDArray[np.float64], rays: int
+) -> NDArray[np.uint8]: ...
+def mesh_buffers(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    crease_degrees: float,
+    camera: NDArray[np.float64],
+    size: int,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
+def draw_mesh(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    crease_degrees: float,
+    camera: NDArray[np.float64],
+    out: NDArray[np.uint8] | None = None,
+) -> NDArray[np.uint8]: ...
+def draw_mesh_views(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    crease_degrees: float,
+    config: str,
+    seed: int,
+    index: int,
+    drawings: NDArray[np.uint8],
+) -> NDArray[np.float64]: ...
 def frustum(shape: NDArray[np.float64], camera: NDArray[np.float64], rays: int) -> NDArray[np.uint8]: ...
 def buffers(
     shape: NDArray[np.float64], camera: NDArray[np.float64], size: int

@@ -129,6 +129,42 @@ def generate(
 
 
 @app.command()
+def prepare(
+    folder: Annotated[
+        Path, typer.Argument(help="Folder of meshes: .obj .off .stl .ply .glb .gltf, in folders or not.")
+    ],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The data set; what is there already is kept.")],
+    up: Annotated[
+        str, typer.Option(help="What is up in the files: x, y, z, -x, -y, -z; auto tells by how the meshes stand.")
+    ] = "auto",
+    front: Annotated[
+        str, typer.Option(help="Where the objects look, in the files' axes, beside --up; auto tells by their looks.")
+    ] = "auto",
+    split: Annotated[str, typer.Option(help="Shares for training, validation and tests.")] = "0.8,0.1,0.1",
+    thin: Annotated[
+        bool,
+        typer.Option("--thin/--no-thin", help="Fill what is thinner than a voxel; else it is missing, as in voxelize."),
+    ] = True,
+    jobs: Annotated[int | None, typer.Option(help="Processes; the default is one a core.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Make a data set to train on of a folder of meshes, whatever they are.
+
+    Each is turned upright and to the front, scaled so that the world is 120 % of its largest side, cleaned and
+    voxelised, solid even where it is open. What was repaired, and what was left out and why, is printed, and written
+    to DATASET/report.json. A file's split depends on its content alone. `sketchcore train --data` goes on from there.
+    """
+    with _errors():
+        from sketchcore.datagen.prepare import Preparation, shares_of
+        from sketchcore.datagen.prepare import prepare as prepare_meshes
+
+        told = Preparation(up, front, shares_of(split), thin)
+        with _bar("meshes", quiet=as_json) as show:
+            report = prepare_meshes(folder, out, told, jobs=jobs, progress=show)
+    typer.echo(json.dumps(report.to_dict()) if as_json else report.summary())
+
+
+@app.command()
 def train(
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for weights and checkpoints.")],
     preset: Annotated[
@@ -148,10 +184,17 @@ def train(
         Path | None, typer.Option("--from", help="Weights to begin with, of the preset's network; else random ones.")
     ] = None,
     grammar: Grammar = None,
+    data: Annotated[
+        Path | None, typer.Option("--data", help="Meshes to learn from (sketchcore prepare), instead of the grammar's.")
+    ] = None,
     device: Annotated[str | None, typer.Option(help="cpu or cuda; the default is the best there is.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Train networks on samples straight from the generator; say --minutes or --steps, or take laptop or gpu."""
+    """Train networks on samples straight from the generator; say --minutes or --steps, or take laptop or gpu.
+
+    With --data, samples are drawn from the meshes of a data set's training split, and the held-out IoU is that of its
+    validation split; --from begins with weights that know other shapes already.
+    """
     with _errors():
         from dataclasses import asdict
 
@@ -159,7 +202,8 @@ def train(
         from sketchcore.train import train as run_training
         from sketchcore.train.presets import grammar_changes
 
-        run = Run(out, preset, minutes, steps, seed, device, begin=begin, changes=grammar_changes(preset, grammar))
+        changes = grammar_changes(preset, grammar)
+        run = Run(out, preset, minutes, steps, seed, device, begin=begin, changes=changes, data=data)
         try:
             stages = run_training(run, resume=resume, quiet=as_json)
         except KeyboardInterrupt:
@@ -185,12 +229,16 @@ def evaluate(
     drawings: Annotated[
         list[Path] | None, typer.Option("--drawings", help="Folders of people's drawings, for the part drawings.")
     ] = None,
+    data: Annotated[
+        Path | None,
+        typer.Option("--data", help="Data set (sketchcore prepare) whose test split accuracy is measured on instead."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="Folder for PART.json and PART.png, or drawings' pictures.")
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Measure a network: on the fixed test set, or on people's drawings.
+    """Measure a network: on the fixed test set, on meshes of one's own, or on people's drawings.
 
     accuracy: IoU by views and rounds, concavities, carving, ceiling, viewpoint. convergence: ten rounds, and orders of
     the drawings. robustness: faulty drawings. cost: time and memory. drawings: outlines of people's drawings, pieces,
@@ -203,7 +251,7 @@ def evaluate(
         if part not in PARTS:
             raise ValueError(f"unknown part {part!r}; the parts are {', '.join(PARTS)}")
         with _bar(part) as show:
-            report = measure_part(part, model, shapes, drawings, out, show)
+            report = measure_part(part, model, shapes, drawings, out, show, data)
         if out is not None:
             write_part(part, report, out)
     if as_json:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -13,10 +14,13 @@ from sketchcore import _core
 from sketchcore.camera import Camera, pack_cameras
 from sketchcore.destination import destination
 from sketchcore.linestyle import STYLES, LineStyle, as_style, check_seed
+from sketchcore.meshfile import load_mesh
 from sketchcore.shape import Shape
 
 if TYPE_CHECKING:
     import trimesh
+
+    Solid = Shape | trimesh.Trimesh | str | os.PathLike[str]
 
 SIDE = 64
 IMAGE = 256
@@ -24,12 +28,10 @@ LINES = ("contours", "creases", "ridges", "valleys", "suggestive", "hidden", "ha
 """Kinds of lines that `draw` knows."""
 SIDES = (32, 64, 128, 256)
 """Grids that are resampled have so many cells along each side."""
+CREASE_DEGREES = 40.0
+"""A mesh is round where its faces bend by no more than this: a ring of ten facets is, an octagon is not."""
 
-
-def _as_shape(shape: object) -> Shape:
-    if isinstance(shape, Shape):
-        return shape
-    raise TypeError(f"expected a sketchcore.Shape, got {type(shape).__name__}; only voxelize takes meshes")
+Faces = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
 def _as_camera(camera: object) -> Camera:
@@ -38,13 +40,21 @@ def _as_camera(camera: object) -> Camera:
     raise TypeError(f"expected a sketchcore.Camera, got {type(camera).__name__}")
 
 
-def _as_mesh(mesh: object) -> trimesh.Trimesh | None:
+def _as_solid(solid: object) -> NDArray[np.float64] | Faces:
+    """A packed shape, or the vertices and faces of a mesh."""
+    if isinstance(solid, Shape):
+        return solid.packed
+    if isinstance(solid, str | os.PathLike):
+        solid = load_mesh(solid)
     # Who has a mesh has imported trimesh; nobody else should wait for it.
     module = sys.modules.get("trimesh")
-    return mesh if module is not None and isinstance(mesh, module.Trimesh) else None
+    if module is not None and isinstance(solid, module.Trimesh):
+        return np.ascontiguousarray(solid.vertices, np.float64), np.ascontiguousarray(solid.faces, np.int64)
+    expected = "a trimesh.Trimesh, a path to a mesh file or a sketchcore.Shape"
+    raise TypeError(f"expected {expected}, got {type(solid).__name__}")
 
 
-def voxelize(shape: Shape | trimesh.Trimesh, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
+def voxelize(shape: Solid, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
     """The world grid of a solid: uint8 [64, 64, 64] (x, y, z), 1 where a voxel's centre is inside.
 
     A `Shape` is taken as it stands. A mesh, y up, is scaled and centred: the grid's cube is 120 % of the largest side
@@ -53,63 +63,84 @@ def voxelize(shape: Shape | trimesh.Trimesh, out: NDArray[np.uint8] | None = Non
     rays along the three axes; a sheet that encloses nothing leaves no voxels (rust/src/solid.rs says more).
 
     Args:
-        shape: the shape or mesh.
+        shape: the shape, the mesh, or the path of a mesh file.
         out: an array of the result's shape and dtype to write into, and to return.
 
     Raises:
         ValueError: for a mesh without faces or extent, with an index out of range, or with NaN or infinity in a vertex;
-            for an `out` of another shape, not C-contiguous or not writeable.
-        TypeError: for anything but a `Shape` or a `trimesh.Trimesh`, or an `out` of another dtype.
+            for a file that is no mesh; for an `out` of another shape, not C-contiguous or not writeable.
+        FileNotFoundError: if there is no such file.
+        TypeError: for anything but a `Shape`, a `trimesh.Trimesh` or a path, or an `out` of another dtype.
     """
     into = destination(out, (SIDE,) * 3, np.uint8)
-    mesh = _as_mesh(shape)
-    if mesh is not None:
-        vertices, faces = np.ascontiguousarray(mesh.vertices, np.float64), np.ascontiguousarray(mesh.faces, np.int64)
-        return _core.voxelize_mesh(vertices, faces, into)
-    if not isinstance(shape, Shape):
-        raise TypeError(f"expected a trimesh.Trimesh or a sketchcore.Shape, got {type(shape).__name__}")
-    return _core.voxelize(shape.packed, into)
+    solid = _as_solid(shape)
+    return _core.voxelize_mesh(*solid, into) if isinstance(solid, tuple) else _core.voxelize(solid, into)
 
 
-def frustum(shape: Shape, camera: Camera, rays: int = 4) -> NDArray[np.uint8]:
-    """The camera grid of a shape: uint8 [64, 64, 64] (depth, row, col), the share of a cell inside, 255 = all.
+def frustum(shape: Solid, camera: Camera, rays: int = 4) -> NDArray[np.uint8]:
+    """The camera grid of a solid: uint8 [64, 64, 64] (depth, row, col), the share of a cell inside, 255 = all.
 
-    Exact along depth, sampled by `rays` x `rays` (1 to 16) rays a cell across the image.
+    Sampled by `rays` x `rays` (1 to 16) rays a cell across the image. Along depth exact for a `Shape`; for a mesh,
+    placed as by `voxelize`, at four places a cell, in a world grid of 128^3 voxels.
 
     Raises:
-        ValueError: if the camera stands inside the shape.
-        TypeError: for anything but a `Shape` and a `Camera`.
+        ValueError: if the camera stands inside the shape, or as `voxelize` does for a mesh.
+        TypeError: for anything but a solid and a `Camera`.
     """
-    return _core.frustum(_as_shape(shape).packed, _as_camera(camera).packed, rays)
+    solid, packed = _as_solid(shape), _as_camera(camera).packed
+    if not isinstance(solid, tuple):
+        return _core.frustum(solid, packed, rays)
+    grid: NDArray[np.uint8] = _core.mesh_frusta(*solid, packed[None], rays)[0]
+    return grid
 
 
-def buffers(shape: Shape, camera: Camera, size: int = IMAGE) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Depth and normals of a shape, by one ray a pixel.
+def buffers(
+    shape: Solid, camera: Camera, size: int = IMAGE, *, crease_degrees: float = CREASE_DEGREES
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Depth and normals of a shape, or of a mesh placed as by `voxelize`, by one ray a pixel.
+
+    Faces of a mesh are seen from either side.
+
+    Args:
+        shape: the shape, the mesh, or the path of a mesh file.
+        camera: where it is seen from.
+        size: pixels along each side, 1 to 4096.
+        crease_degrees: 0 to 90; normals of a mesh are smooth across edges at which it bends by no more.
 
     Returns:
         depth: float32 [size, size], world units along the camera's z axis; infinite where nothing is seen.
         normal: float32 [size, size, 3], unit normals in the world, towards the eye; 0 where nothing is seen.
 
     Raises:
-        ValueError: if the camera stands inside the shape, or size is not between 1 and 4096.
-        TypeError: for anything but a `Shape` and a `Camera`.
+        ValueError: if the camera stands inside the solid, a number is out of range, or as `voxelize` does for a mesh.
+        FileNotFoundError: if there is no such file.
+        TypeError: for anything but a solid and a `Camera`.
     """
-    return _core.buffers(_as_shape(shape).packed, _as_camera(camera).packed, size)
+    return _buffers(_as_solid(shape), _as_camera(camera).packed, size, crease_degrees)
+
+
+def _buffers(
+    solid: NDArray[np.float64] | Faces, packed: NDArray[np.float64], size: int, crease_degrees: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    if isinstance(solid, tuple):
+        return _core.mesh_buffers(*solid, crease_degrees, packed, size)
+    return _core.buffers(solid, packed, size)
 
 
 def draw(
-    shape: Shape,
+    shape: Solid,
     camera: Camera,
     out: NDArray[np.uint8] | None = None,
     *,
     lines: str | Sequence[str] = "all",
     style: str | LineStyle = "clean",
     seed: int = 0,
+    crease_degrees: float = CREASE_DEGREES,
 ) -> NDArray[np.uint8]:
-    """The line drawing of a shape, uint8 [256, 256], ink 255 on 0 (Saito and Takahashi; paper, section 4.2).
+    """The line drawing of a solid, uint8 [256, 256], ink 255 on 0 (Saito and Takahashi; paper, section 4.2).
 
     Args:
-        shape: the shape.
+        shape: the shape, the mesh, or the path of a mesh file; a mesh is placed as by `voxelize`.
         camera: where it is seen from.
         out: an array of the result's shape and dtype to write into, and to return.
         lines: "all", which is "contours" and "creases" together, or one or several of these: "contours", where a
@@ -119,24 +150,30 @@ def draw(
             "hatching", strokes in the shade.
         style: how the lines are put down: a name from `sketchcore.STYLES`, or a `LineStyle`.
         seed: of what is random in a style; the same one draws the same.
+        crease_degrees: 0 to 90; edges at which a mesh bends by no more are tessellation, and leave no lines.
 
     Raises:
-        ValueError: if the camera stands inside the shape, for unknown lines or styles, a seed outside 0 ... 2^64 - 1,
-            or for an `out` of another shape, not C-contiguous or not writeable.
-        TypeError: for anything but a `Shape` and a `Camera`, what is no style, or an `out` of another dtype.
+        ValueError: if the camera stands inside the solid, for unknown lines or styles, a number out of range, or as
+            `voxelize` does for a mesh; for an `out` of another shape, not C-contiguous or not writeable.
+        FileNotFoundError: if there is no such file.
+        TypeError: for anything but a solid and a `Camera`, what is no style, hidden lines of a mesh, or an `out` of
+            another dtype.
     """
-    hand, seed, kinds = as_style(style), check_seed(seed), _as_kinds(lines)
+    solid, hand, seed, kinds = _as_solid(shape), as_style(style), check_seed(seed), _as_kinds(lines)
     into = destination(out, (IMAGE,) * 2, np.uint8)
     stand = hand.packed_camera(_as_camera(camera), seed)
     if kinds is not None:
         hidden = None
         if "hidden" in kinds:
-            if not isinstance(shape, Shape):
+            if isinstance(solid, tuple):
                 raise TypeError("hidden lines are those of a sketchcore.Shape: nothing else knows what lies behind")
-            hidden = _core.hidden_lines(shape.packed, stand)
-        seen = buffers(shape, Camera.from_packed(stand))
+            hidden = _core.hidden_lines(solid, stand)
+        seen = _buffers(solid, stand, IMAGE, crease_degrees)
         return _core.draw_kinds(*seen, stand, hidden, kinds, hand.to_json(), seed, into)
-    _core.draw(_as_shape(shape).packed, stand, into)
+    if isinstance(solid, tuple):
+        _core.draw_mesh(*solid, crease_degrees, stand, into)
+    else:
+        _core.draw(solid, stand, into)
     return into if hand == STYLES["clean"] else hand.redraw(into, seed, into)
 
 

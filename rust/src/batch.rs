@@ -5,11 +5,12 @@ use crate::camera::{Camera, DISTANCE, FAR, FOV_DEGREES, IMAGE, NEAR, QUARTER_VIE
 use crate::csg::Shape;
 use crate::error::CoreError;
 use crate::grammar::GrammarConfig;
-use crate::lines::{LineConfig, draw};
+use crate::lines::LineConfig;
 use crate::pen::{PenConfig, redraw};
 use crate::random::Random;
 use crate::stroke;
 use crate::style::StyleConfig;
+use crate::subject::Subject;
 use crate::voxel::{BitGrid, CELLS};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -169,39 +170,54 @@ pub fn sample(
     given: Option<&Shape>,
     slot: Slot,
 ) -> Result<(Shape, Vec<Camera>), CoreError> {
-    let views = slot.drawings.len() / (IMAGE * IMAGE);
     let (shape, grid) = match given {
         Some(shape) => (shape.clone(), BitGrid::of_shape(shape)),
         None => config.grammar.draw(&mut Random::new(seed, index, SHAPE))?,
     };
     grid.write_bytes(slot.world);
-    let free = |v: usize| Random::new(seed, index, FREE + v as u64);
-    let cameras = draw_cameras(config, &shape, views, &mut Random::new(seed, index, CAMERAS), free);
-    let arrays = slot.drawings.chunks_exact_mut(IMAGE * IMAGE).zip(slot.frusta.chunks_exact_mut(CELLS));
-    for (v, ((stand, camera), (drawing, frustum))) in cameras.iter().zip(arrays).enumerate() {
+    let cameras = draw_views(config, &shape, seed, index, slot.drawings)?;
+    for (camera, frustum) in cameras.iter().zip(slot.frusta.chunks_exact_mut(CELLS)) {
         fill_frustum(&shape, camera, config.frustum_rays, frustum)?;
+    }
+    Ok((shape, cameras))
+}
+
+/// The drawings of sample `index`, as many as there is room for, of any subject; and the cameras that their truth is in.
+pub fn draw_views(
+    config: &SampleConfig,
+    subject: &impl Subject,
+    seed: u64,
+    index: u64,
+    drawings: &mut [u8],
+) -> Result<Vec<Camera>, CoreError> {
+    let views = drawings.len() / (IMAGE * IMAGE);
+    let free = |v: usize| Random::new(seed, index, FREE + v as u64);
+    let cameras = draw_cameras(config, subject, views, &mut Random::new(seed, index, CAMERAS), free);
+    for (v, ((stand, camera), drawing)) in
+        cameras.iter().zip(drawings.chunks_exact_mut(IMAGE * IMAGE)).enumerate()
+    {
         let mut random = Random::new(seed, index, STYLE + v as u64);
         if random.chance(config.styles.share) {
-            draw_in_style(config, &shape, camera, &mut random, drawing)?;
+            draw_in_style(config, subject, camera, &mut random, drawing)?;
             continue;
         }
         let mut random = Random::new(seed, index, PEN + v as u64);
         if random.chance(config.hand.share) {
-            let hand = hand_camera(&config.hand, stand, camera, &shape, &mut random);
-            draw(&shape, &hand, &config.lines, drawing)?;
+            let hand = hand_camera(&config.hand, stand, camera, subject, &mut random);
+            subject.draw(&hand, &config.lines, drawing)?;
             let ink = drawing.iter().map(|&ink| ink > 0).collect();
             drawing.copy_from_slice(&redraw(ink, &config.hand.pen, &mut random));
         } else {
-            draw(&shape, camera, &config.lines, drawing)?;
+            subject.draw(camera, &config.lines, drawing)?;
         }
     }
-    Ok((shape, cameras.into_iter().map(|(_, camera)| camera).collect()))
+    Ok(cameras.into_iter().map(|(_, camera)| camera).collect())
 }
 
-/// Draws a shape in a style of its own, from about where the camera stands.
+/// Draws it in a style of its own, from about where the camera stands.
 fn draw_in_style(
     config: &SampleConfig,
-    shape: &Shape,
+    subject: &impl Subject,
     camera: &Camera,
     random: &mut Random,
     drawing: &mut [u8],
@@ -209,9 +225,9 @@ fn draw_in_style(
     let style = config.styles.draw(random);
     let turned = style.camera(camera, random);
     // A wide field of view brings it so near that it may stand within the shape.
-    let camera = if shape.contains(turned.position) { camera } else { &turned };
+    let camera = if subject.may_hold(turned.position) { camera } else { &turned };
     let mut lines = vec![0; IMAGE * IMAGE];
-    draw(shape, camera, &config.lines, &mut lines)?;
+    subject.draw(camera, &config.lines, &mut lines)?;
     stroke::redraw(&lines, &style, random, drawing);
     Ok(())
 }
@@ -297,13 +313,13 @@ impl Stand {
 /// shape stays in sight.
 fn draw_cameras(
     config: &SampleConfig,
-    shape: &Shape,
+    subject: &impl Subject,
     views: usize,
     random: &mut Random,
     free: impl Fn(usize) -> Random,
 ) -> Vec<(Stand, Camera)> {
     let mut left: Vec<usize> = (0..VIEWPOINTS.len()).collect();
-    let corners = corners(shape);
+    let corners = corners(subject);
     (0..views)
         .map(|v| {
             let choices = if v == 0 { QUARTER_VIEWS } else { left.len() };
@@ -326,7 +342,7 @@ fn hand_camera(
     config: &HandConfig,
     stand: &Stand,
     camera: &Camera,
-    shape: &Shape,
+    subject: &impl Subject,
     random: &mut Random,
 ) -> Camera {
     // The product of two even numbers: mostly small, seldom near the largest.
@@ -342,13 +358,13 @@ fn hand_camera(
     let shift = DVec3::new(error(config.shift), error(config.shift), 0.0) * pixel;
     let displacement = camera.to_camera(DVec3::ZERO) + shift;
     let by = DVec3::new(0.0, 0.0, stand.distance()) - displacement;
-    let by = by * turned.room_for(by, &corners(shape));
+    let by = by * turned.room_for(by, &corners(subject));
     let turned = turned.displaced(by);
     Camera::new(turned.position, turned.axes, fov, camera.near, camera.far).unwrap_or(turned)
 }
 
-fn corners(shape: &Shape) -> Vec<DVec3> {
-    let (lo, hi) = shape.bounds();
+fn corners(subject: &impl Subject) -> Vec<DVec3> {
+    let (lo, hi) = subject.bounds();
     (0..8)
         .map(|c| {
             let pick = |a: usize| if c >> a & 1 == 0 { lo[a] } else { hi[a] };

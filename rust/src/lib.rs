@@ -3,9 +3,10 @@
 //! ```text
 //! random -> grammar -> csg, fit -> voxel                      the truth, world grid
 //!         triangle mesh -> solid ----^
-//!                       |
-//!                     camera ----> raycast -> buffers -> lines, kinds -> pen    the drawing
-//!                                     |                    +-> trace -> stroke (by style) -> brush
+//!               |       |
+//!               |     camera ----> raycast -> buffers -> lines, kinds -> pen    the drawing
+//!               +-> surface -----> raster ------^          +-> trace -> stroke (by style) -> brush
+//!                                     |
 //!                                     +------> buffers::fill_frustum        the truth, camera grid
 //! batch: all of these for one sample, and samples side by side
 //!
@@ -42,11 +43,14 @@ pub mod pen;
 #[cfg(feature = "python")]
 mod python;
 pub mod random;
+pub mod raster;
 pub mod raycast;
 pub mod resample;
 pub mod solid;
 pub mod stroke;
 pub mod style;
+pub mod subject;
+pub mod surface;
 pub mod trace;
 pub mod trilinear;
 pub mod voxel;

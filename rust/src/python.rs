@@ -4,6 +4,7 @@
 mod arrays;
 mod drawings;
 mod lift;
+mod meshes;
 mod pools;
 mod samples;
 mod strokes;
@@ -46,11 +47,13 @@ mod _core {
     #[pymodule_export]
     use super::lift::{lift, lift_taps, lift_transposed};
     #[pymodule_export]
+    use super::meshes::{draw_mesh, draw_mesh_views, mesh_buffers, mesh_frusta, mesh_shares, voxelize_mesh};
+    #[pymodule_export]
     use super::samples::{default_config, fit, generate};
     #[pymodule_export]
     use super::strokes::{check_style, draw_kinds, hidden_lines, random_style, redraw, style_camera, trace};
     #[pymodule_export]
     use super::views::{buffers, draw, frustum, isosurface, lines, viewpoints};
     #[pymodule_export]
-    use super::volumes::{bilateral, to_camera_grid, to_world_grid, voxelize, voxelize_mesh};
+    use super::volumes::{bilateral, to_camera_grid, to_world_grid, voxelize};
 }

@@ -19,10 +19,14 @@
 
 mod crossings;
 mod faces;
+mod finer;
 
 use crate::dispatch::for_each_instruction_set;
 use crate::voxel::{BitGrid, SIDE};
-use crossings::{COLUMNS, Crossings, ONE, Point, Vote};
+use crossings::{COLUMNS, Crossings, Vote};
+pub(crate) use crossings::{ONE, Point};
+pub use finer::{Finer, shares};
+use glam::DVec3;
 use std::collections::HashSet;
 
 /// The world grid covers this much of a mesh's largest side: the paper's 120 %.
@@ -41,6 +45,8 @@ pub enum SolidError {
     Vertex(usize),
     #[error("the mesh's largest side is {0}; it must be more than 0, and a finite number")]
     Extent(f64),
+    #[error("the crease angle must lie between 0 and 90 degrees, got {0}")]
+    Crease(f64),
 }
 
 /// The voxels inside a mesh, scaled and centred by the 120 % rule: the grid's cube is 120 % of the largest side of the
@@ -54,7 +60,11 @@ pub enum SolidError {
 ///
 /// [`SolidError`] for no faces, an index out of range, a coordinate that is not finite, or no extent.
 pub fn voxelize(vertices: &[[f64; 3]], faces: &[[i64; 3]]) -> Result<BitGrid, SolidError> {
-    let frame = Frame::around(vertices, faces)?;
+    Ok(inside(&Frame::around(vertices, faces)?, vertices, faces))
+}
+
+/// What a mesh encloses of a grid.
+fn inside(frame: &Frame, vertices: &[[f64; 3]], faces: &[[i64; 3]]) -> BitGrid {
     let points = frame.place(vertices, AXES[2]);
     let wound = |faces: &[[i64; 3]]| {
         let along_z = Crossings::of(&points, faces);
@@ -64,19 +74,19 @@ pub fn voxelize(vertices: &[[f64; 3]], faces: &[[i64; 3]]) -> Result<BitGrid, So
     let words = wound(faces).unwrap_or_else(|| {
         let single = without_doubles(&points, faces);
         let again = if single.len() < faces.len() { wound(&single) } else { None };
-        again.unwrap_or_else(|| vote(&frame, vertices, &single))
+        again.unwrap_or_else(|| vote(frame, vertices, &single))
     });
-    Ok(BitGrid::of_words(words))
+    BitGrid::of_words(words)
 }
 
 /// How a mesh's coordinates become a grid's.
-struct Frame {
+pub(crate) struct Frame {
     middle: [f64; 3],
     scale: f64,
 }
 
 impl Frame {
-    fn around(vertices: &[[f64; 3]], faces: &[[i64; 3]]) -> Result<Self, SolidError> {
+    pub(crate) fn around(vertices: &[[f64; 3]], faces: &[[i64; 3]]) -> Result<Self, SolidError> {
         if faces.is_empty() {
             return Err(SolidError::NoFaces);
         }
@@ -105,6 +115,22 @@ impl Frame {
             return Err(SolidError::Extent(side));
         }
         Ok(Self { middle: [0, 1, 2].map(|a| low[a] / 2.0 + high[a] / 2.0), scale })
+    }
+
+    /// A frame in which a mesh lies so many voxels further along each axis.
+    fn moved(&self, voxels: [f64; 3]) -> Self {
+        let by = voxels.map(|v| v * f64::from(ONE) / self.scale);
+        Self { middle: std::array::from_fn(|a| self.middle[a] - by[a]), scale: self.scale }
+    }
+
+    /// A vertex in the world.
+    pub(crate) fn world(&self, vertex: [f64; 3]) -> DVec3 {
+        (DVec3::from(vertex) - DVec3::from(self.middle)) * (self.scale / (SIDE as f64 * f64::from(ONE)))
+    }
+
+    /// The vertices in the grid, by which it is told which of them are the same.
+    pub(crate) fn points(&self, vertices: &[[f64; 3]]) -> Vec<Point> {
+        self.place(vertices, AXES[2])
     }
 
     /// The vertices in the grid, their axes in the given order: columns run along the last of them.

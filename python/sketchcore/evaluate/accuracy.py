@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sketchcore.camera import Camera, pack_cameras
+from sketchcore.datagen.prepared import Prepared
 from sketchcore.evaluate.figure import Figure
 from sketchcore.evaluate.report import Report
-from sketchcore.evaluate.testset import Example, count_shapes, load_testset
+from sketchcore.evaluate.testset import Example, count_shapes, load_meshes, load_testset
 from sketchcore.grids import carve, to_world_grid
 from sketchcore.nets.models import Model
 from sketchcore.nets.sketches import Sketches
@@ -20,6 +22,7 @@ from sketchcore.rounds import TOLERANCE, Volume, until_settled
 from sketchcore.viewpoint import guess_viewpoint, opposite
 from sketchcore.volume import iou
 
+TESTSET = "the fixed test set"
 VIEWS = 4
 ROUNDS = 5
 
@@ -40,6 +43,7 @@ class Accuracy(Report):
         viewpoint: share of first drawings whose viewpoint is guessed, up to the half turn about y.
         seconds: seconds a shape for all passes of the network.
         each: [shape][views], IoU after the last round.
+        source: what the shapes are of.
     """
 
     shapes: int
@@ -52,27 +56,39 @@ class Accuracy(Report):
     viewpoint: Figure
     seconds: float
     each: list[list[float]]
+    source: str = TESTSET
 
 
 def measure_accuracy(
-    model: Model, shapes: int | None = None, progress: Callable[[int, int], None] | None = None
+    model: Model,
+    shapes: int | None = None,
+    data: Path | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Accuracy:
     """Measures a model on the fixed test set, from exact drawings, in the world grid (paper, sections 6.1 and 6.5).
 
     Args:
         model: the network.
-        shapes: the first so many; None for all 500.
+        shapes: the first so many; None for all.
+        data: data set of meshes (`sketchcore prepare`) whose test split is measured on instead.
         progress: called as `progress(done, total)` after each shape.
 
     Raises:
-        ValueError: for a number of shapes outside 1 ... 500.
+        FileNotFoundError: if there is no such data set.
+        ValueError: for a number of shapes outside 1 ... 500, or more than the test split has; for an empty one.
     """
-    total = count_shapes(shapes)
+    examples: Iterator[Example]
+    if data is None:
+        source, examples, total = TESTSET, load_testset(shapes, progress), count_shapes(shapes)
+    else:
+        meshes = Prepared(data)
+        source, examples = f"the test split of {meshes.folder.name}", load_meshes(meshes, shapes, progress)
+        total = shapes or meshes.count("test")
     network = np.empty((total, VIEWS, ROUNDS + 1))
     concavities, carving, orthogonal = np.empty((3, total, VIEWS))
     ceiling, viewpoint = np.empty((2, total))
     seconds = 0.0
-    for i, example in enumerate(load_testset(shapes, progress)):
+    for i, example in enumerate(examples):
         hulls = _hulls(example.drawings, list(example.cameras))
         started = time.perf_counter()
         for v in range(VIEWS):
@@ -97,6 +113,7 @@ def measure_accuracy(
         viewpoint=Figure.of(viewpoint),
         seconds=seconds / total,
         each=last.tolist(),
+        source=source,
     )
 
 

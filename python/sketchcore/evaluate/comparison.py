@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sketchcore.evaluate.accuracy import TESTSET
 from sketchcore.evaluate.figure import Figure
 from sketchcore.evaluate.report import Report
 
@@ -37,19 +38,25 @@ def compare(reports: Sequence[str | os.PathLike[str]]) -> Comparison:
 
     Raises:
         FileNotFoundError: for a report that does not exist.
-        ValueError: for fewer than two, two of the same name, or a file that is no such report.
+        ValueError: for fewer than two, two of the same name, a file that is no such report, or other shapes.
     """
     names = [Path(report).stem for report in reports]
     if len(names) < 2 or len(set(names)) < len(names):
         raise ValueError(f"a comparison takes two or more reports of different names, got {names}")
-    each = []
+    each, sources = [], set()
     for report in reports:
         try:
-            values = np.array(json.loads(Path(report).read_text())["each"], np.float64)
+            read = json.loads(Path(report).read_text())
+            values = np.array(read["each"], np.float64)
             shapes, views = values.shape
+            sources.add(read.get("source", TESTSET))
         except (KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{report} was not written by sketchcore evaluate accuracy --json: {error!r}") from error
         each.append(values)
+    if len(sources) > 1:
+        raise ValueError(
+            f"networks are compared on the same shapes; these were measured on {', '.join(sorted(sources))}"
+        )
     shapes = min(len(values) for values in each)
     views = min(values.shape[1] for values in each)
     each = [values[:shapes, :views] for values in each]

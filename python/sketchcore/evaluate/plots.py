@@ -34,7 +34,7 @@ def _canvas(title: str, height: float = 4) -> Canvas:
 
 def plot_accuracy(report: Accuracy, path: str | os.PathLike[str]) -> None:
     """IoU and the recall of concavities against the number of views, beside carving."""
-    canvas = _canvas(f"{report.shapes} shapes of the fixed test set, 95 % intervals")
+    canvas = _canvas(f"{report.shapes} shapes of {report.source}, 95 % intervals")
     left, right = canvas.subplots(1, 2)
     views = range(1, len(report.carving) + 1)
     _band(left, views, [by_round[-1] for by_round in report.network], f"network, round {ROUNDS}")

@@ -29,7 +29,7 @@ def _table(title: str, *columns: str) -> Table:
 def accuracy_table(report: Accuracy) -> Table:
     """IoU by row and number of views; 95 % intervals in brackets for all figures."""
     counts = range(1, len(report.carving) + 1)
-    table = _table(f"IoU on the first {report.shapes} shapes of the fixed test set, world grid", *map(_views, counts))
+    table = _table(f"IoU on the first {report.shapes} shapes of {report.source}, world grid", *map(_views, counts))
     for r in range(ROUNDS + 1):
         name = "network, first prediction" if r == 0 else f"network, round {r}"
         table.add_row(name, *(str(by_round[r]) for by_round in report.network))

@@ -11,7 +11,7 @@ from sketchcore.evaluate.accuracy import VIEWS, settled
 from sketchcore.evaluate.distort import STRENGTHS, distorted
 from sketchcore.evaluate.figure import Figure
 from sketchcore.evaluate.report import Report
-from sketchcore.evaluate.testset import Example, count_shapes, load_testset
+from sketchcore.evaluate.testset import ShapeExample, count_shapes, load_testset
 from sketchcore.nets.models import Model
 from sketchcore.volume import iou
 
@@ -69,7 +69,7 @@ def measure_robustness(
     )
 
 
-def _scores(model: Model, example: Example, faults: dict[str, int], seed: int) -> list[float]:
+def _scores(model: Model, example: ShapeExample, faults: dict[str, int], seed: int) -> list[float]:
     drawings = np.stack(
         [
             distorted(example.shape, camera, faults, np.random.default_rng((seed, v)))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from sketchcore.datagen.generate import generate
+from sketchcore.datagen.prepared import Prepared
 from sketchcore.nets.compact import CompactConfig, CompactNet, read_inputs
 from sketchcore.nets.models import CompactModel
 from sketchcore.nets.precision import autocast, place, unit
@@ -52,12 +53,18 @@ class Chain:
     prior: NDArray[np.float32]
 
 
-def start_chain(preset: Preset, seed: int, index: int) -> Chain:
-    """Chain number `index` of a seed; how many drawings and passes it has depends on these two alone."""
+def start_chain(preset: Preset, seed: int, index: int, data: Prepared | None = None) -> Chain:
+    """Chain number `index` of a seed; how many drawings and passes it has depends on these two alone.
+
+    Of a shape that the generator makes, or of a mesh from the training split of a data set.
+    """
     random = np.random.default_rng((seed, index))
     views = 1 + int(random.choice(len(DRAWINGS), p=DRAWINGS))
     length = 1 + int(random.choice(len(PASSES), p=PASSES))
-    batch = generate(seed, 1, first=index, views=views, config=preset.generator, grammar=preset.grammar, threads=1)
+    if data is None:
+        batch = generate(seed, 1, first=index, views=views, config=preset.generator, grammar=preset.grammar, threads=1)
+    else:
+        batch = data.batch("train", seed, 1, first=index, views=views, config=preset.generator)
     chain = Chain(
         Sketches(batch.drawings[0], batch.packed_cameras[0]),
         WORLD_TRUTHS[preset.truth](batch, 0),
@@ -77,13 +84,20 @@ class ChainStage:
         samples: how many shapes have been started.
     """
 
-    def __init__(self, preset: Preset, seed: int, device: torch.device, samples: int, config: CompactConfig) -> None:
+    def __init__(
+        self,
+        preset: Preset,
+        seed: int,
+        device: torch.device,
+        samples: int,
+        config: CompactConfig,
+        data: Prepared | None = None,
+    ) -> None:
         self.model = place(CompactNet(config), device)
-        self._device = device
-        self._grammar = preset.grammar
+        self._device, self._grammar, self._data = device, preset.grammar, data
         self._loss = distance_loss if preset.truth == "distance" else occupancy_loss
         self.samples = 0
-        self._chains = Ahead(partial(start_chain, preset, seed), samples, 2 * preset.batch, preset.threads)
+        self._chains = Ahead(partial(start_chain, preset, seed, data=data), samples, 2 * preset.batch, preset.threads)
         self._batch = [self._next() for _ in range(preset.batch)]
 
     @property
@@ -113,7 +127,8 @@ class ChainStage:
     def measure(self, net: nn.Module) -> float:
         """The held-out IoU of a network like the model: from one drawing and from three, after a round."""
         assert isinstance(net, CompactNet)
-        scores = heldout_iou(CompactModel(net, self._device), views=(1, 3), grammar=self._grammar)
+        model = CompactModel(net, self._device)
+        scores = heldout_iou(model, views=(1, 3), grammar=self._grammar, data=self._data)
         return sum(scores) / len(scores)
 
     def close(self) -> None:

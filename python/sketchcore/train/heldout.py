@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sketchcore.datagen.generate import generate
+from sketchcore.datagen.prepared import Prepared
 from sketchcore.nets.models import Model
 from sketchcore.nets.sketches import Sketches
 from sketchcore.volume import iou
@@ -16,10 +17,21 @@ SEED = 2**63
 
 
 def heldout_iou(
-    model: Model, views: Sequence[int], rounds: int = 1, shapes: int = 16, grammar: str | None = None
+    model: Model,
+    views: Sequence[int],
+    rounds: int = 1,
+    shapes: int = 16,
+    grammar: str | None = None,
+    data: Prepared | None = None,
 ) -> list[float]:
-    """Mean IoU in the world grid after some rounds over exact drawings of a grammar's shapes, by numbers of views."""
-    batch = generate(SEED, shapes, views=max(views), grammar=grammar)
+    """Mean IoU in the world grid after some rounds over exact drawings, for each number of views.
+
+    Of shapes of a grammar, or of as many from the validation split of a data set.
+    """
+    if data is None:
+        batch = generate(SEED, shapes, views=max(views), grammar=grammar)
+    else:
+        batch = data.batch("val", SEED, shapes := min(shapes, data.count("val")), views=max(views))
     scores = []
     for count in views:
         each = []

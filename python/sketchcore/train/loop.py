@@ -15,6 +15,7 @@ from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 from torch import Tensor, nn
 
+from sketchcore.datagen.prepared import Prepared
 from sketchcore.nets.compact import CompactConfig, CompactNet
 from sketchcore.nets.multiscale import MultiscaleNet
 from sketchcore.nets.precision import pick_device
@@ -75,6 +76,7 @@ class Run:
         options: what differs from the network's default configuration; for tiny networks in tests.
         changes: what differs from the preset.
         begin: weights to begin with instead of random ones; the options are theirs then.
+        data: data set of meshes (`sketchcore prepare`) to learn from instead of the grammar's shapes.
     """
 
     out: Path
@@ -88,6 +90,7 @@ class Run:
     options: dict[str, Any] | None = None
     changes: dict[str, Any] | None = None
     begin: Path | None = None
+    data: Path | None = None
 
     def __post_init__(self) -> None:
         if self.preset not in PRESETS:
@@ -108,6 +111,23 @@ class Run:
     def constants(self) -> Preset:
         """The preset with this run's changes."""
         return replace(PRESETS[self.preset], **(self.changes or {}))
+
+    def meshes(self) -> Prepared | None:
+        """The data set, if there is one, looked at.
+
+        Raises:
+            FileNotFoundError: if it is not there.
+            ValueError: if it is none, has no meshes to train on or to measure with, or none of the preset's truth.
+        """
+        if self.data is None:
+            return None
+        if (self.constants.network, self.constants.truth) == ("compact", "fractional"):
+            raise ValueError(
+                "the truth 'fractional' is measured on shapes, and meshes are none; take the preset compact"
+            )
+        data = Prepared(self.data)
+        data.require("train", "val")
+        return data
 
 
 def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]:
@@ -130,6 +150,8 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
     if resume and run.begin is not None:
         raise ValueError("a resumed run goes on from its checkpoint; leave out the weights to begin with")
     beginning = None if run.begin is None else read_beginning(run.begin, run.constants)
+    data = run.meshes()
+    task = run.constants.task | ({} if data is None else {"data": data.fingerprint})
     run.out.mkdir(parents=True, exist_ok=True)
     stages = run.constants.stages
     checkpoints = {name: run.out / f"{name}.checkpoint.safetensors" for name in stages}
@@ -143,40 +165,42 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
     results = []
     for index, name in enumerate(stages):
         found = load_checkpoint(checkpoints[name]) if checkpoints[name].exists() else None
-        if found and found.task != run.constants.task:
-            learnt, asked = (", ".join(task.values()) for task in (found.task, run.constants.task))
+        if found and found.task != task:
+            learnt, asked = (", ".join(t.values()) for t in (found.task, task))
             raise ValueError(
                 f"{checkpoints[name]} learns other things ({learnt}) than the preset {run.preset} ({asked}); "
-                "resume it with its own preset, or name another folder"
+                "resume it with its own preset and data, or name another folder"
             )
         # A later stage that has begun shows that this one is done.
         begun = any(checkpoints[later].exists() for later in stages[index + 1 :])
         progress = found.progress if found else Progress(name, began=beginning.record if beginning else None)
-        stage = _stage(run, progress, device, trained)
+        stage = _stage(run, progress, device, trained, data)
         try:
             if beginning and name in beginning.states:
                 _fill(stage.model, beginning.states[name])
-            loop = _Loop(run, stage, found, progress, checkpoints[name])
+            loop = _Loop(run, stage, found, progress, checkpoints[name], task)
             results.append(loop.progress if begun else loop.go(share=1 / len(stages), quiet=quiet))
         finally:
             stage.close()
         trained[name] = loop.average
-        _save_weights(run, trained, results)
+        _save_weights(run, trained, results, data)
     return results
 
 
-def _stage(run: Run, progress: Progress, device: torch.device, trained: dict[str, Network]) -> Stage:
+def _stage(
+    run: Run, progress: Progress, device: torch.device, trained: dict[str, Network], data: Prepared | None
+) -> Stage:
     torch.manual_seed(run.seed)
     name, samples = progress.stage, progress.samples
     constants, options = run.constants, run.options or (progress.began or {}).get("options", {})
     if name == "compact":
-        return ChainStage(constants, run.seed, device, samples, CompactConfig.of_options(options))
+        return ChainStage(constants, run.seed, device, samples, CompactConfig.of_options(options), data)
     if name == "updater":
         single = trained["single"]
         assert isinstance(single, PaperNet)
-        return UpdaterStage(constants, run.seed, device, samples, single)
+        return UpdaterStage(constants, run.seed, device, samples, single, data)
     net = PaperNet(**options) if name == "single" else MultiscaleNet(**options)
-    return SingleStage(constants, run.seed, device, samples, net)
+    return SingleStage(constants, run.seed, device, samples, net, data)
 
 
 def _fill(net: Network, state: dict[str, Tensor]) -> None:
@@ -189,8 +213,16 @@ def _fill(net: Network, state: dict[str, Tensor]) -> None:
 class _Loop:
     """One stage: optimiser, moving average, checkpoints."""
 
-    def __init__(self, run: Run, stage: Stage, found: Checkpoint | None, progress: Progress, path: Path) -> None:
-        self.run, self.stage, self.path = run, stage, path
+    def __init__(
+        self,
+        run: Run,
+        stage: Stage,
+        found: Checkpoint | None,
+        progress: Progress,
+        path: Path,
+        task: dict[str, str],
+    ) -> None:
+        self.run, self.stage, self.path, self.task = run, stage, path, task
         self.constants = run.constants
         self.progress = progress
         c = self.constants
@@ -276,7 +308,7 @@ class _Loop:
     def _save(self) -> None:
         average = self.average.state_dict() if self.constants.average else {}
         moments = [optimizer.state_dict()["state"] for optimizer in self.optimizers]
-        save_checkpoint(self.path, self.stage.model.state_dict(), average, moments, self.progress, self.constants.task)
+        save_checkpoint(self.path, self.stage.model.state_dict(), average, moments, self.progress, self.task)
 
 
 @torch.no_grad()
@@ -289,7 +321,7 @@ def move_average(average: nn.Module, model: nn.Module, decay: float) -> None:
             mean.copy_(now)
 
 
-def _save_weights(run: Run, trained: dict[str, Network], results: list[Progress]) -> None:
+def _save_weights(run: Run, trained: dict[str, Network], results: list[Progress], data: Prepared | None) -> None:
     constants = run.constants
     several = len(constants.stages) > 1
     states = {f"{stage}." if several else "": net.state_dict() for stage, net in trained.items()}
@@ -301,6 +333,7 @@ def _save_weights(run: Run, trained: dict[str, Network], results: list[Progress]
             "seed": run.seed,
             **asdict(constants),
             "generator": dict(constants.generator),
+            **({} if data is None else {"data": {"name": data.folder.name, "fingerprint": data.fingerprint}}),
             "runs": [asdict(progress) for progress in results],
         },
     }

@@ -15,6 +15,7 @@ from torch import Tensor, nn
 
 from sketchcore import _core
 from sketchcore.datagen.generate import Batch, generate
+from sketchcore.datagen.prepared import Prepared
 from sketchcore.nets.models import PaperModel
 from sketchcore.nets.multiscale import MultiscaleNet
 from sketchcore.nets.precision import autocast, place, unit
@@ -26,12 +27,14 @@ from sketchcore.train.presets import Preset
 from sketchcore.train.truth import in_camera_grids
 
 
-def _batches(preset: Preset, seed: int, first: int, views: int) -> Ahead[Batch]:
-    return Ahead(partial(_batch, preset, seed, first, views), 0, 1, preset.threads)
+def _batches(preset: Preset, seed: int, first: int, views: int, data: Prepared | None) -> Ahead[Batch]:
+    return Ahead(partial(_batch, preset, seed, first, views, data), 0, 1, preset.threads)
 
 
-def _batch(preset: Preset, seed: int, first: int, views: int, number: int) -> Batch:
+def _batch(preset: Preset, seed: int, first: int, views: int, data: Prepared | None, number: int) -> Batch:
     first += number * preset.batch
+    if data is not None:
+        return data.batch("train", seed, preset.batch, first=first, views=views, config=preset.generator, frusta=True)
     chosen: dict[str, Any] = {"config": preset.generator, "grammar": preset.grammar}
     return generate(seed, preset.batch, first=first, views=views, threads=1, **chosen)
 
@@ -44,12 +47,20 @@ class SingleStage:
         samples: how many shapes have been used.
     """
 
-    def __init__(self, preset: Preset, seed: int, device: torch.device, samples: int, net: SingleViewNet) -> None:
+    def __init__(
+        self,
+        preset: Preset,
+        seed: int,
+        device: torch.device,
+        samples: int,
+        net: SingleViewNet,
+        data: Prepared | None = None,
+    ) -> None:
         self.model = place(net, device)
         self.samples = 0
         self._truth, self._grammar = preset.truth, preset.grammar
-        self._device = device
-        self._batches = _batches(preset, seed, samples, views=1)
+        self._device, self._data = device, data
+        self._batches = _batches(preset, seed, samples, views=1, data=data)
 
     @property
     def waited(self) -> float:
@@ -68,7 +79,8 @@ class SingleStage:
     def measure(self, net: nn.Module) -> float:
         """The held-out IoU of a network like the model: from one drawing."""
         assert isinstance(net, PaperNet | MultiscaleNet)
-        return heldout_iou(SingleViewModel(net, self._device), views=(1,), rounds=0, grammar=self._grammar)[0]
+        model = SingleViewModel(net, self._device)
+        return heldout_iou(model, views=(1,), rounds=0, grammar=self._grammar, data=self._data)[0]
 
     def close(self) -> None:
         """Stops the threads."""
@@ -83,14 +95,22 @@ class UpdaterStage:
         samples: how many shapes have been used.
     """
 
-    def __init__(self, preset: Preset, seed: int, device: torch.device, samples: int, single: PaperNet) -> None:
+    def __init__(
+        self,
+        preset: Preset,
+        seed: int,
+        device: torch.device,
+        samples: int,
+        single: PaperNet,
+        data: Prepared | None = None,
+    ) -> None:
         self.model = place(PaperNet(updater=True, width=single.width), device)
         self.samples = 0
         self._truth, self._grammar = preset.truth, preset.grammar
         self._single = single
         self._predict = SingleViewModel(single, device).predict
-        self._device = device
-        self._batches = _batches(preset, seed, samples, views=2)
+        self._device, self._data = device, data
+        self._batches = _batches(preset, seed, samples, views=2, data=data)
 
     @property
     def waited(self) -> float:
@@ -118,7 +138,7 @@ class UpdaterStage:
         """The held-out IoU of a network like the model: from two drawings, after a round."""
         assert isinstance(net, PaperNet)
         model = PaperModel(self._single, net, self._device)
-        return heldout_iou(model, views=(2,), rounds=1, grammar=self._grammar)[0]
+        return heldout_iou(model, views=(2,), rounds=1, grammar=self._grammar, data=self._data)[0]
 
     def close(self) -> None:
         """Stops the threads."""

@@ -24,15 +24,25 @@ REACH = 4
 
 
 def binary(batch: Batch, index: int) -> NDArray[np.float32]:
-    """Whether the centres of one sample's voxels are inside: float32 [64, 64, 32], the half grid z > 0, 0 or 1."""
-    return batch.world[index, :, :, 32:].astype(np.float32)
+    """Whether the centres of one sample's voxels are inside: float32 [64, 64, 32], the half grid z > 0, 0 or 1.
+
+    One half where the sample is not symmetric about z = 0, and it is so on one side alone.
+    """
+    world = batch.world[index]
+    inside: NDArray[np.float32] = (world[:, :, 32:] + world[:, :, 31::-1]).astype(np.float32) / np.float32(2)
+    return inside
 
 
 def fractional(batch: Batch, index: int) -> NDArray[np.float32]:
     """The share of each voxel that is inside: float32 [64, 64, 32], the half grid z > 0, in 0..1.
 
     Measured by 4 x 4 x 4 samples a voxel, evenly spaced: each is the grid of the shape moved the other way.
+
+    Raises:
+        ValueError: for a batch without shapes.
     """
+    if not len(batch.packed_shapes):
+        raise ValueError("the truth 'fractional' is measured on shapes, and meshes are none; take the preset compact")
     offsets = ((np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5) / 64
     moved = batch.packed_shapes[index].copy()
     centers = moved[:, 2:5].copy()

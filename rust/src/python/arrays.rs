@@ -96,6 +96,13 @@ pub fn check_size(size: i64) -> PyResult<usize> {
     Err(PyValueError::new_err(format!("size must lie between 1 and 4096 pixels, got {size}")))
 }
 
+pub fn check_rays(rays: i64) -> PyResult<usize> {
+    if (1..=16).contains(&rays) {
+        return Ok(rays as usize);
+    }
+    Err(PyValueError::new_err(format!("rays must lie between 1 and 16, got {rays}")))
+}
+
 pub fn shape_of(rows: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Shape> {
     let width = if rows.shape().get(1) == Some(&WIDE) { WIDE } else { NARROW };
     let numbers = checked(rows, "shape", &[-1, width as isize])?;

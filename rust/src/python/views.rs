@@ -1,6 +1,6 @@
 //! What a camera sees of a shape or of a volume.
 
-use super::arrays::{all_finite, camera_of, check_size, checked, filled, grid, shape_of};
+use super::arrays::{all_finite, camera_of, check_rays, check_size, checked, filled, grid, shape_of};
 use crate::buffers::{Buffers, fill_frustum};
 use crate::camera::{Camera, DISTANCE, IMAGE, PACKED, VIEWPOINTS};
 use crate::lines::{LineConfig, detect};
@@ -27,16 +27,13 @@ pub fn frustum<'py>(
     rays: i64,
 ) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
     let (shape, camera) = (shape_of(&shape)?, camera_of(&camera)?);
-    if !(1..=16).contains(&rays) {
-        return Err(PyValueError::new_err(format!("rays must lie between 1 and 16, got {rays}")));
-    }
-    let rays = rays as usize;
+    let rays = check_rays(rays)?;
     let mut cells = vec![0; CELLS];
     py.detach(|| fill_frustum(&shape, &camera, rays, &mut cells))?;
     grid(py, cells, &[])
 }
 
-type BufferArrays<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray3<f32>>);
+pub type BufferArrays<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray3<f32>>);
 
 #[pyfunction]
 pub fn buffers<'py>(
@@ -65,7 +62,7 @@ pub fn isosurface<'py>(
     buffer_arrays(py, py.detach(|| crate::isosurface::cast(volume, level, &camera, size)))
 }
 
-fn buffer_arrays<'py>(py: Python<'py>, made: Buffers) -> PyResult<BufferArrays<'py>> {
+pub fn buffer_arrays<'py>(py: Python<'py>, made: Buffers) -> PyResult<BufferArrays<'py>> {
     let size = made.size;
     let depth = made.depth.into_pyarray(py).reshape([size, size])?;
     let normal = made.normal.into_flattened().into_pyarray(py).reshape([size, size, 3])?;

@@ -5,7 +5,6 @@ use crate::camera::Camera;
 use crate::error::CoreError;
 use crate::mesh::BilateralSettings;
 use crate::resample;
-use crate::solid;
 use crate::voxel::{BitGrid, SIDE};
 use numpy::{
     IntoPyArray, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn,
@@ -24,21 +23,8 @@ pub fn voxelize<'py>(
     voxels(py, out, || Ok(BitGrid::of_shape(&shape)))
 }
 
-#[pyfunction]
-#[pyo3(signature = (vertices, faces, out=None))]
-pub fn voxelize_mesh<'py>(
-    py: Python<'py>,
-    vertices: PyReadonlyArrayDyn<'py, f64>,
-    faces: PyReadonlyArrayDyn<'py, i64>,
-    out: Option<Bound<'py, PyArrayDyn<u8>>>,
-) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
-    let vertices = checked(&vertices, "vertices", &[-1, 3])?.as_chunks::<3>().0;
-    let faces = checked(&faces, "faces", &[-1, 3])?.as_chunks::<3>().0;
-    voxels(py, out, || Ok(solid::voxelize(vertices, faces)?))
-}
-
 /// A solid's voxels as bytes, in `out` or a fresh array.
-fn voxels<'py>(
+pub fn voxels<'py>(
     py: Python<'py>,
     out: Option<Bound<'py, PyArrayDyn<u8>>>,
     solid: impl FnOnce() -> PyResult<BitGrid> + Send,
