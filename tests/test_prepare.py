@@ -16,7 +16,7 @@ from sketchcore.camera import VIEWPOINTS
 from sketchcore.cli import app
 from sketchcore.datagen.cleaning import LeftOutError, place
 from sketchcore.datagen.prepare import Preparation, _Workers, prepare, shares_of
-from sketchcore.datagen.prepared import Prepared, load_object
+from sketchcore.datagen.prepared import MeshObject, Prepared, load_object
 from sketchcore.datagen.upright import AXES, elect, facing, turn
 from sketchcore.meshfile import load_mesh
 from sketchcore.train.chains import start_chain
@@ -219,6 +219,9 @@ def test_what_is_thinner_than_a_voxel_is_filled():
         assert set(np.unique(slab[:, 18:46])) == {1}
         assert made.found["thin_voxels"] > 1000
         assert made.found["filled"] == 1
+        camera = VIEWPOINTS["right"]
+        cells = MeshObject(made.vertices, made.faces, made.world).frusta(camera.packed[None])[0]
+        assert cells.astype(float).sum() > 0.8 * 255 * sk.to_camera_grid(made.world, camera).sum()
     # A tilted rod hangs together; nothing is added to what voxels show.
     rod = trimesh.creation.cylinder(0.004, segment=[[0, 0, 0], [0.3, 1, 0.2]])
     world = placed_by(rod, True).world

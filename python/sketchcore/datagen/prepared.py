@@ -52,6 +52,16 @@ class MeshObject:
         """Vertices and faces, as the Rust core takes them."""
         return self.vertices.astype(np.float64), self.faces.astype(np.int64)
 
+    def frusta(self, cameras: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """Its camera grids for packed cameras [n, 15], thin parts filled: uint8 [n, 64, 64, 64], 255 = all."""
+        cells: NDArray[np.uint8] = _core.mesh_frusta(*self.packed, cameras, 2)
+        thin = (self.world > 0) & (_core.voxelize_mesh(*self.packed) == 0)
+        if thin.any():
+            worlds = np.repeat(thin[None].astype(np.float32), len(cameras), axis=0)
+            shares = np.rint(255 * _core.to_camera_grid(worlds, cameras)).astype(np.uint8)
+            np.maximum(cells, shares, out=cells)
+        return cells
+
 
 def save_object(path: Path, item: MeshObject, found: Mapping[str, Any]) -> None:
     """Writes an object, whole or not at all, and what is known of it."""
@@ -198,13 +208,7 @@ class Prepared:
             world[i] = item.world
             cameras[i] = _core.draw_mesh_views(*item.packed, CREASE_DEGREES, text, seed, first + i, drawings[i])
             if frusta:
-                cells[i] = _core.mesh_frusta(*item.packed, cameras[i], 2)
-                thin = item.world & ~_core.voxelize_mesh(*item.packed) & 1
-                if thin.any():
-                    worlds = np.repeat(thin[None].astype(np.float32), views, axis=0)
-                    np.maximum(
-                        cells[i], np.rint(255 * _core.to_camera_grid(worlds, cameras[i])), cells[i], casting="unsafe"
-                    )
+                cells[i] = item.frusta(cameras[i])
         return Batch(drawings, world, cells, cameras, ())
 
 

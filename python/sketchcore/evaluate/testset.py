@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sketchcore.camera import QUARTER_VIEWS, VIEWPOINTS, Camera
-from sketchcore.datagen.prepared import Prepared
+from sketchcore.datagen.prepared import MeshObject, Prepared
 from sketchcore.grids import draw, frustum, voxelize
 from sketchcore.shape import Shape
 
@@ -72,12 +72,17 @@ class ShapeExample(Example):
 class MeshExample(Example):
     """One mesh of a data set; its truth is what it was prepared as, thin parts filled."""
 
-    prepared: NDArray[np.uint8]
+    item: MeshObject
 
     @cached_property
     def world(self) -> NDArray[np.uint8]:
         """uint8 [64, 64, 64], the truth in the world grid."""
-        return self.prepared
+        return self.item.world
+
+    def frustum(self, view: int) -> NDArray[np.float32]:
+        """float32 [64, 64, 64] in 0..1, the truth in a camera's grid."""
+        cells: NDArray[np.uint8] = self.item.frusta(self.cameras[view].packed[None])[0]
+        return cells.astype(np.float32) / np.float32(255)
 
 
 def count_shapes(shapes: int | None) -> int:
@@ -136,6 +141,6 @@ def load_meshes(
         cameras = data.batch("test", 0, 1, first=i, views=4).cameras[0]
         # Displaced cameras are turned as their viewpoints are.
         off = {name: abs(VIEWPOINTS[name].rotation - cameras[0].rotation).max() for name in QUARTER_VIEWS}
-        yield MeshExample(mesh, tuple(cameras), min(off, key=lambda name: off[name]), item.world)
+        yield MeshExample(mesh, tuple(cameras), min(off, key=lambda name: off[name]), item)
         if progress is not None:
             progress(i + 1, count)
