@@ -21,6 +21,7 @@ from sketchcore.nets.compact import CompactNet
 from sketchcore.nets.precision import place
 from sketchcore.nets.weights import load_weights
 from sketchcore.train import PRESETS, Run, train
+from sketchcore.train.beginning import read_beginning
 from sketchcore.train.chains import ChainStage, start_chain
 from sketchcore.train.checkpoint import load_checkpoint
 from sketchcore.train.optimizers import FilterMuon, make_optimizers
@@ -91,6 +92,12 @@ def test_a_run_begins_with_the_weights_of_another(tmp_path: Path) -> None:
     [resumed] = train(Run(second, steps=2, changes={"batch": 2}), resume=True, quiet=True)
     assert resumed.step == 2
     assert resumed.began == config, "a resumed run knows its options and its beginning"
+
+
+def test_the_weights_inside_the_package_are_known_by_name() -> None:
+    begun = read_beginning(Path("pretrained"), PRESETS["chair"])
+    assert begun.record["network"] == "compact"
+    assert set(begun.states) == {"compact"}
 
 
 def test_weights_that_a_run_cannot_begin_with_are_refused(tmp_path: Path) -> None:

@@ -181,7 +181,12 @@ def train(
     seed: Annotated[int, typer.Option(help="Of samples and initial weights.")] = 0,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint in the folder.")] = False,
     begin: Annotated[
-        Path | None, typer.Option("--from", help="Weights to begin with, of the preset's network; else random ones.")
+        Path | None,
+        typer.Option(
+            "--from",
+            help="Weights to begin with, of the preset's network; pretrained for those inside the package; else random "
+            "ones.",
+        ),
     ] = None,
     grammar: Grammar = None,
     data: Annotated[

@@ -6,9 +6,8 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -19,7 +18,7 @@ from sketchcore.drawing import load_drawing
 from sketchcore.mesh import MESH_SUFFIXES, extract_mesh, save_mesh
 from sketchcore.nets.models import Model, build_model
 from sketchcore.nets.sketches import Sketches
-from sketchcore.nets.weights import load_weights
+from sketchcore.nets.weights import PRETRAINED, load_weights
 from sketchcore.rounds import TOLERANCE, Volume, until_settled
 from sketchcore.viewpoint import guess_camera
 from sketchcore.volume import load_binvox, load_npz, save_binvox, save_npz
@@ -257,5 +256,4 @@ def load_model(model: ModelLike = None, device: str | torch.device | None = None
 
 @lru_cache(maxsize=2)
 def _pretrained(device: str | None) -> Model:
-    path = cast(Path, files("sketchcore") / "pretrained" / "compact.safetensors")
-    return build_model(*load_weights(path), device=device)
+    return build_model(*load_weights(PRETRAINED), device=device)

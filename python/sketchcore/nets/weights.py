@@ -8,8 +8,9 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
+from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import torch
 from safetensors import SafetensorError
@@ -19,6 +20,8 @@ from torch import Tensor
 from sketchcore.atomic import write_atomically
 
 SUFFIX = ".safetensors"
+PRETRAINED = cast(Path, files("sketchcore") / "pretrained" / "compact.safetensors")
+"""The weights inside the package."""
 
 
 def save_weights(

@@ -8,7 +8,7 @@ from typing import Any
 
 from torch import Tensor
 
-from sketchcore.nets.weights import load_weights
+from sketchcore.nets.weights import PRETRAINED, load_weights
 from sketchcore.train.presets import Preset
 
 
@@ -28,11 +28,15 @@ class Beginning:
 def read_beginning(path: Path, preset: Preset) -> Beginning:
     """Reads weights for a run of a preset.
 
+    Args:
+        path: of the weights; "pretrained" for those inside the package.
+        preset: what is trained.
+
     Raises:
         FileNotFoundError: if there are none.
         ValueError: if they are no weights, or another network's than the preset's.
     """
-    state, config = load_weights(path)
+    state, config = load_weights(PRETRAINED if path == Path("pretrained") else path)
     if config.get("network") != preset.network:
         raise ValueError(
             f"{path} holds a network {config.get('network')!r}, and this preset trains {preset.network!r}; "

@@ -75,7 +75,8 @@ class Run:
         evaluate_every: seconds between measurements of the held-out IoU.
         options: what differs from the network's default configuration; for tiny networks in tests.
         changes: what differs from the preset.
-        begin: weights to begin with instead of random ones; the options are theirs then.
+        begin: weights to begin with instead of random ones, "pretrained" for those inside the package; the options
+            are theirs then.
         data: data set of meshes (`sketchcore prepare`) to learn from instead of the grammar's shapes.
     """
 
