@@ -1,7 +1,7 @@
 """Twenty people at once on one server: whether all are served, how long they wait, and what the server holds.
 
 Run as `python docs/app/crowd.py`; it prints JSON. Each client draws a box from four sides, stroke by stroke, has it
-reconstructed after every side, and looks at the solid and the mesh; all begin together, six times over.
+reconstructed after every side, and looks at the solid and the mesh; all begin together, four times over.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "app"))
 
 from hand import HIGH, LOW, AppServer, box_edges
 
-CLIENTS, WAVES = 20, 6
+CLIENTS, WAVES = 20, 4
 SIDES = ("quarter-037", "left", "front", "quarter-232")
 
 
