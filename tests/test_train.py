@@ -234,6 +234,8 @@ def test_the_presets_of_classes_train_on_their_shapes(tmp_path: Path, name: str)
     config = json.loads((tmp_path / "weights.json").read_text())
     assert config["training"]["grammar"] == name
     assert "grammar" not in config["training"]["generator"]
+    with pytest.raises(ValueError, match="resume it with its own preset, grammar and data"):
+        train(tiny(tmp_path, steps=2), resume=True, quiet=True)
 
 
 def test_any_preset_trains_on_another_grammars_shapes() -> None:

@@ -35,7 +35,7 @@ def test_a_run_learns_from_meshes(data: Path, tmp_path: Path) -> None:
     assert len(config["training"]["data"]["fingerprint"]) == 16
     [resumed] = train(Run(tmp_path / "a", steps=3, data=data, **options), resume=True, quiet=True)
     assert resumed.step == 3
-    with pytest.raises(ValueError, match="resume it with its own preset and data"):
+    with pytest.raises(ValueError, match="resume it with its own preset, grammar and data"):
         train(Run(tmp_path / "a", steps=4, **options), resume=True, quiet=True)
     begun = Run(tmp_path / "b", steps=1, data=data, begin=tmp_path / "a" / "weights.safetensors", changes={"batch": 2})
     [progress] = train(begun, quiet=True)

@@ -170,7 +170,7 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
             learnt, asked = (", ".join(t.values()) for t in (found.task, task))
             raise ValueError(
                 f"{checkpoints[name]} learns other things ({learnt}) than the preset {run.preset} ({asked}); "
-                "resume it with its own preset and data, or name another folder"
+                "resume it with its own preset, grammar and data, or name another folder"
             )
         # A later stage that has begun shows that this one is done.
         begun = any(checkpoints[later].exists() for later in stages[index + 1 :])

@@ -81,7 +81,8 @@ class Preset:
     @property
     def task(self) -> dict[str, str]:
         """What is learnt: a checkpoint goes on with nothing else."""
-        return {"network": self.network, "truth": self.truth}
+        shapes = {} if self.grammar is None else {"grammar": self.grammar}
+        return {"network": self.network, "truth": self.truth, **shapes}
 
 
 # Section 4.4: Adam with these constants, the single view first. Its 1,000,000 iterations are `--steps`.
