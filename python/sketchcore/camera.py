@@ -83,6 +83,11 @@ class Camera:
         """float64 [15], the form the Rust core takes: position, rotation row by row, fov, near, far."""
         return self._packed
 
+    @property
+    def focal(self) -> float:
+        """Focal length in pixels of the 256 x 256 drawing, whose middle is (128, 128)."""
+        return 128 / math.tan(math.radians(self.fov_degrees / 2))
+
     @classmethod
     def from_packed(cls, packed: ArrayLike) -> Camera:
         """The camera of a packed row, float64 [15] (see `packed`)."""

@@ -62,12 +62,11 @@ class Directions:
         """How much of the ink runs along an axis of the world as a camera sees it: 0 to 1, 0 without ink."""
         if not self.weights.any():
             return 0.0
-        focal = 0.5 * 256 / math.tan(math.radians(camera.fov_degrees / 2))
         best = np.zeros(len(self.places))
         for axis in range(3):
             right, down, forward = camera.rotation[:, axis]
             # From a pixel towards the axis' vanishing point, wherever that is, at infinity too.
-            towards = focal * np.array([right, down]) - (self.places - 128) * forward
+            towards = camera.focal * np.array([right, down]) - (self.places - 128) * forward
             length = np.hypot(*towards.T) + 1e-9
             sine = np.abs(towards[:, 0] * self.along[:, 1] - towards[:, 1] * self.along[:, 0]) / length
             off = np.degrees(np.arcsin(sine.clip(0, 1))) / _TOLERANCE

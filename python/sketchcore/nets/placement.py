@@ -140,8 +140,7 @@ def bounds(volume: Volume, least: int = 6) -> tuple[NDArray[np.float64], float] 
 def seen_at(camera: Camera, point: NDArray[np.float64]) -> NDArray[np.float64]:
     """Where a camera sees a point of the world: float64 [2], pixels to the right and down in the 256^2 image."""
     x, y, z = camera.rotation @ (point - camera.position)
-    focal = 128 / math.tan(math.radians(camera.fov_degrees / 2))
-    return np.array([128 + focal * x / z, 128 + focal * y / z])
+    return np.array([128 + camera.focal * x / z, 128 + camera.focal * y / z])
 
 
 def fills(volume: Volume, sketches: Sketches) -> list[float]:

@@ -16,7 +16,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from sketchcore.datagen.generate import generate
 from sketchcore.datagen.prepared import Prepared
 from sketchcore.nets.compact import CompactConfig, CompactNet, read_inputs
 from sketchcore.nets.models import CompactModel
@@ -26,6 +25,7 @@ from sketchcore.train.ahead import Ahead
 from sketchcore.train.heldout import heldout_iou
 from sketchcore.train.loss import distance_loss, occupancy_loss
 from sketchcore.train.presets import Preset
+from sketchcore.train.samples import training_samples
 from sketchcore.train.truth import WORLD_TRUTHS
 
 DRAWINGS = (0.4, 0.25, 0.2, 0.15)
@@ -61,10 +61,7 @@ def start_chain(preset: Preset, seed: int, index: int, data: Prepared | None = N
     random = np.random.default_rng((seed, index))
     views = 1 + int(random.choice(len(DRAWINGS), p=DRAWINGS))
     length = 1 + int(random.choice(len(PASSES), p=PASSES))
-    if data is None:
-        batch = generate(seed, 1, first=index, views=views, config=preset.generator, grammar=preset.grammar, threads=1)
-    else:
-        batch = data.batch("train", seed, 1, first=index, views=views, config=preset.generator)
+    batch = training_samples(preset, seed, index, 1, views, data)
     chain = Chain(
         Sketches(batch.drawings[0], batch.packed_cameras[0]),
         WORLD_TRUTHS[preset.truth](batch, 0),

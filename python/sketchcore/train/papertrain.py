@@ -6,7 +6,6 @@ The multi-scale network is trained like the single view.
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 import numpy as np
 import torch
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from sketchcore import _core
-from sketchcore.datagen.generate import Batch, generate
+from sketchcore.datagen.generate import Batch
 from sketchcore.datagen.prepared import Prepared
 from sketchcore.nets.models import PaperModel
 from sketchcore.nets.multiscale import MultiscaleNet
@@ -24,6 +23,7 @@ from sketchcore.nets.unet import PaperNet, paper_loss
 from sketchcore.train.ahead import Ahead
 from sketchcore.train.heldout import heldout_iou
 from sketchcore.train.presets import Preset
+from sketchcore.train.samples import training_samples
 from sketchcore.train.truth import in_camera_grids
 
 
@@ -33,10 +33,7 @@ def _batches(preset: Preset, seed: int, first: int, views: int, data: Prepared |
 
 def _batch(preset: Preset, seed: int, first: int, views: int, data: Prepared | None, number: int) -> Batch:
     first += number * preset.batch
-    if data is not None:
-        return data.batch("train", seed, preset.batch, first=first, views=views, config=preset.generator, frusta=True)
-    chosen: dict[str, Any] = {"config": preset.generator, "grammar": preset.grammar}
-    return generate(seed, preset.batch, first=first, views=views, threads=1, **chosen)
+    return training_samples(preset, seed, first, preset.batch, views, data, frusta=True)
 
 
 class SingleStage:
