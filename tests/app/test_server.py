@@ -238,7 +238,7 @@ def test_sessions_are_kept_among_the_users_data(monkeypatch, tmp_path):
 
 
 def test_without_nicegui_the_command_says_what_to_install(monkeypatch):
-    monkeypatch.setattr("sketchcore.cli.find_spec", lambda name: None)
+    monkeypatch.setattr("sketchcore.cli.serving.find_spec", lambda name: None)
     result = CliRunner().invoke(command_line, ["app", "--no-browser"])
     assert result.exit_code == 1
     assert "pip install 'sketchcore[app]'" in result.output

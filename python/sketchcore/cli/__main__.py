@@ -1,0 +1,5 @@
+"""python -m sketchcore.cli."""
+
+from sketchcore.cli import app
+
+app()
