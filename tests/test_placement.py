@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import affine_transform
 
 import sketchcore as sk
-from sketchcore.nets.placement import Placement, bounds, out_of_place, plausibility, seen_at
+from sketchcore.nets.placement import Placement, bounds, box_is_off, out_of_place, plausibility, seen_at
 from sketchcore.nets.search import in_place
 from sketchcore.nets.sketches import Sketches
 from sketchcore.outline import outline_iou
@@ -108,12 +108,34 @@ def test_a_drawing_out_of_place_is_brought_back(scale: float, shift: tuple[float
     exact = sk.draw(SHAPE, CAMERA)
     sketches = alone(Placement(scale, shift).move(exact, CAMERA))
     [first] = predict([sketches])
-    assert out_of_place(first, sketches)
-    moved = in_place(predict, sketches, first)
+    moved = in_place(predict, sketches, first, always=True)
     middle, size = Drawn._ink(moved.drawings[0])
     np.testing.assert_allclose(middle, predict.middle, atol=2.0)
     assert size == pytest.approx(predict.size, rel=0.03)
-    np.testing.assert_array_equal(in_place(predict, sketches, first).drawings, moved.drawings)
+    np.testing.assert_array_equal(in_place(predict, sketches, first, always=True).drawings, moved.drawings)
+
+
+@pytest.mark.parametrize(("scale", "shift"), [(0.55, (0.0, 0.0)), (1.0, (0.0, 25.0)), (0.7, (-20.0, 10.0))])
+def test_a_drawing_plainly_out_of_place_is_brought_back_unasked(scale: float, shift: tuple[float, float]) -> None:
+    predict = Drawn(CAMERA)
+    sketches = alone(Placement(scale, shift).move(sk.draw(SHAPE, CAMERA), CAMERA))
+    [first] = predict([sketches])
+    assert out_of_place(first, sketches)
+    assert Drawn._ink(in_place(predict, sketches, first).drawings[0])[1] == pytest.approx(predict.size, rel=0.03)
+
+
+def test_an_exact_drawing_of_a_shape_off_centre_stays_where_it_is() -> None:
+    # What a network is as sure of there as anywhere gains nothing by being moved but a place in the middle.
+    shape = sk.Shape([sk.Cuboid((0, -0.06, 0), (0.3, 0.2, 0.25))])
+
+    def predict(samples: Sequence[Sketches]) -> Iterator[Volume]:
+        for _ in samples:
+            yield (0.9998 * sk.voxelize(shape)).astype(np.float32)
+
+    sketches = alone(sk.draw(shape, CAMERA))
+    [first] = predict([sketches])
+    assert box_is_off(first)
+    assert in_place(predict, sketches, first) is sketches
 
 
 def test_a_drawing_in_its_place_is_not_touched() -> None:

@@ -30,9 +30,10 @@ FAR = (0.61, 0.36, 1.4, 2.2)
 box's middle from the origin along x and y. Fitted to tell places that are far apart (docs/training.md)."""
 NEAR = (1.0, 0.0, 0.7, 1.05)
 """The same to tell from which side a drawing was made, to within a few degrees."""
-_OFF, _POOR = 0.035, 0.8
-"""A drawing whose solid is off by less, in size or place, and fills more of its outline, is not plainly out of place.
-Of exact drawings, about one in twelve is."""
+_OFF = 0.035
+"""A solid that is off by less, in size or place, fits its box."""
+_PLAIN = 0.17
+"""Drawings that fall short by more (`shortfall`) are plainly out of place: a better place could gain so much."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +77,8 @@ class Placement:
 
 
 def out_of_place(volume: Volume, sketches: Sketches) -> bool:
-    """Whether drawings are plainly out of place: the prediction is off centre or off size, or leaves outlines empty."""
-    return box_is_off(volume) or float(min(fills(volume, sketches))) < _POOR
+    """Whether drawings are plainly out of place: the solid is far off centre or off size, or leaves outlines empty."""
+    return shortfall(volume, sketches) > _PLAIN
 
 
 def box_is_off(volume: Volume) -> bool:
@@ -97,16 +98,29 @@ def plausibility(volume: Volume, sketches: Sketches, weights: tuple[float, float
         sketches: what it was made from.
         weights: `FAR` or `NEAR`.
     """
-    box = bounds(volume)
-    if box is None:
-        return -math.inf
-    middle, side = box
-    filled, size, along_x, along_y = weights
     occupied = volume > 0.5
+    if not occupied.any():
+        return -math.inf
     # The IoU that is to be expected of the solid, if each voxel is right as often as it says.
     expected = float(volume[occupied].sum() / (occupied.sum() + volume[~occupied].sum()))
+    return expected + weights[0] - shortfall(volume, sketches, weights)
+
+
+def shortfall(volume: Volume, sketches: Sketches, weights: tuple[float, float, float, float] = FAR) -> float:
+    """By how much a prediction misses the size and the place that objects have, and its drawings' outlines; 0 is best.
+
+    Args:
+        volume: float32 [64, 64, 64], the prediction.
+        sketches: what it was made from.
+        weights: `FAR` or `NEAR`.
+    """
+    box = bounds(volume)
+    if box is None:
+        return math.inf
+    middle, side = box
+    filled, size, along_x, along_y = weights
     off = size * abs(math.log(LARGEST / side)) + float(abs(middle) @ (along_x, along_y, 0))
-    return expected + filled * float(np.mean(fills(volume, sketches))) - off
+    return off + filled * (1 - float(np.mean(fills(volume, sketches))))
 
 
 def bounds(volume: Volume, least: int = 6) -> tuple[NDArray[np.float64], float] | None:

@@ -30,7 +30,9 @@ Predict = Callable[[Sequence[Sketches]], Iterator[Volume]]
 """A network's first predictions, one for the drawings of each object."""
 
 _GAIN = 0.03
-"""How much more plausible another place must be than the one where the drawing is."""
+"""How much more plausible another place must be than the one where the drawing is, for one that is looked for."""
+_PLAIN_GAIN = 0.14
+"""The same where nobody asked: exact drawings of odd shapes may look out of place, but gain less (docs/training.md)."""
 _DOUBT = 0.03
 """The likelihood of a place grows by e for so much more of its score."""
 _STEPS = 3
@@ -67,8 +69,9 @@ def in_place(predict: Predict, sketches: Sketches, first: Volume, always: bool =
         return sketches
     alone = [Sketches(sketches.drawings[i : i + 1], sketches.cameras[i : i + 1]) for i in range(len(sketches))]
     firsts = [first] if len(alone) == 1 else predict(alone)
+    gain = _GAIN if always else _PLAIN_GAIN
     found = [
-        _search(predict, one, volume) if always or out_of_place(volume, one) else Placement()
+        _search(predict, one, volume, gain) if always or out_of_place(volume, one) else Placement()
         for one, volume in zip(alone, firsts, strict=True)
     ]
     if all(place == Placement() for place in found):
@@ -77,7 +80,7 @@ def in_place(predict: Predict, sketches: Sketches, first: Volume, always: bool =
     moved = Sketches(np.concatenate([s.drawings for s in taken]), np.concatenate([s.cameras for s in taken]))
     if len(alone) > 1:
         [together] = predict([moved])
-        if plausibility(together, moved) < plausibility(first, sketches) + _GAIN:
+        if plausibility(together, moved) < plausibility(first, sketches) + gain:
             return sketches
     return moved
 
@@ -100,21 +103,22 @@ class _Tried:
         return plausibility(self.volume, self.sketches, NEAR)
 
 
-def _search(predict: Predict, sketches: Sketches, first: Volume) -> Placement:
-    """Where one drawing belongs; where it is, unless another place is better by a clear margin."""
+def _search(predict: Predict, sketches: Sketches, first: Volume, gain: float) -> Placement:
+    """Where one drawing belongs; where it is, unless another place is more plausible by so much."""
 
     def attempt(places: Sequence[Placement]) -> list[_Tried]:
         taken = [place.of(sketches) for place in places]
         return [_Tried(*one) for one in zip(places, taken, predict(taken), strict=True)]
 
     here = _Tried(Placement(), sketches, first)
-    return _refined(attempt, _far(attempt, here) if box_is_off(first) else here).place
+    begun = _far(attempt, here, gain) if box_is_off(first) else here
+    return _refined(attempt, begun, gain if begun is here else _GAIN).place
 
 
 Attempt = Callable[[Sequence[Placement]], list[_Tried]]
 
 
-def _far(attempt: Attempt, here: _Tried) -> _Tried:
+def _far(attempt: Attempt, here: _Tried, gain: float) -> _Tried:
     """The place that solids' boxes point to, from where the drawing is and from where it would fit roughly."""
     camera = Camera.from_packed(here.sketches.cameras[0])
     tried = [here, *attempt([_roughly(here.sketches, camera)])]
@@ -137,10 +141,10 @@ def _far(attempt: Attempt, here: _Tried) -> _Tried:
         weighed += attempt(_around(mean, spread))
         mean = _mean([one.place for one in weighed], [one.plausibility for one in weighed])
     [best] = attempt([mean])
-    return best if best.plausibility > here.plausibility + _GAIN else here
+    return best if best.plausibility > here.plausibility + gain else here
 
 
-def _refined(attempt: Attempt, begun: _Tried) -> _Tried:
+def _refined(attempt: Attempt, begun: _Tried, gain: float) -> _Tried:
     """From which side it was drawn, and the last pixels."""
     if begun.plausibility == -math.inf:  # nothing is predicted that could be judged
         return begun
@@ -158,7 +162,7 @@ def _refined(attempt: Attempt, begun: _Tried) -> _Tried:
     tried += attempt(_around(best.place, _NEAR_SPREAD))
     tried += attempt([_mean([one.place for one in tried], [score(one) for one in tried])])
     best = max(tried, key=score)
-    return best if score(best) > score(begun) + _GAIN else begun
+    return best if score(best) > score(begun) + gain else begun
 
 
 def _roughly(sketches: Sketches, camera: Camera) -> Placement:
