@@ -40,6 +40,13 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         fresh.unlink(missing_ok=True)
 
 
+def sweep(path: str | os.PathLike[str]) -> None:
+    """Takes away what is left in the folder of writers of a file that were killed. None may be writing it."""
+    target = Path(path)
+    for left in target.parent.glob(f".{target.stem}-{'[0-9a-f]' * 8}{target.suffix}"):
+        left.unlink(missing_ok=True)
+
+
 def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
     """Writes bytes to a file, whole or not at all."""
     with replacing(path) as fresh:

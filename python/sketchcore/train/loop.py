@@ -15,6 +15,7 @@ from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 from torch import Tensor, nn
 
+from sketchcore.atomic import sweep
 from sketchcore.datagen.prepared import Prepared
 from sketchcore.nets.compact import CompactConfig, CompactNet
 from sketchcore.nets.multiscale import MultiscaleNet
@@ -165,6 +166,8 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
         raise FileExistsError(f"{existing[0]} exists; go on from it with --resume, or name another folder")
     if resume and not existing:
         raise FileNotFoundError(f"no checkpoint in {run.out}; start without --resume")
+    for path in (*checkpoints.values(), run.out / "weights.safetensors", run.out / "weights.json"):
+        sweep(path)
     device = pick_device(run.device)
     trained: dict[str, Network] = {}
     results = []
