@@ -24,7 +24,7 @@ ENGINES = (["--engine", "local"], ["--engine", "processes", "--workers", "2"])
 def start(out: Path, engine: list[str]) -> subprocess.Popen[bytes]:
     """The command, under way."""
     command = [sys.executable, "-m", "sketchcore.cli", "generate", *TOLD, *engine, "-o", str(out)]
-    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 def finish(process: subprocess.Popen[bytes]) -> None:
@@ -33,9 +33,8 @@ def finish(process: subprocess.Popen[bytes]) -> None:
     Raises:
         RuntimeError: if it fails.
     """
-    _, said = process.communicate()
-    if process.returncode != 0:
-        raise RuntimeError(f"the export failed: {said.decode()}")
+    if process.wait() != 0:
+        raise RuntimeError(f"{' '.join(map(str, process.args))} failed with exit code {process.returncode}")  # type: ignore[arg-type]
 
 
 def seen(folder: Path) -> dict[str, bytes]:
