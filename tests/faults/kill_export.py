@@ -17,13 +17,14 @@ from typing import Any
 from kills import kill_within, main
 
 SHARDS = 8
-TOLD = ["--shards", str(SHARDS), "--count", "400", "--views", "2", "--seed", "5"]
+COUNT = 400
 ENGINES = (["--engine", "local"], ["--engine", "processes", "--workers", "2"])
 
 
-def start(out: Path, engine: list[str]) -> subprocess.Popen[bytes]:
+def start(out: Path, engine: list[str], count: int) -> subprocess.Popen[bytes]:
     """The command, under way."""
-    command = [sys.executable, "-m", "sketchcore.cli", "generate", *TOLD, *engine, "-o", str(out)]
+    told = ["--shards", str(SHARDS), "--count", str(count), "--views", "2", "--seed", "5"]
+    command = [sys.executable, "-m", "sketchcore.cli", "generate", *told, *engine, "-o", str(out)]
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
@@ -44,8 +45,8 @@ def seen(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir() if not path.name.startswith(".")}
 
 
-def kill_export(kills: int, folder: Path) -> dict[str, Any]:
-    """Kills exports until there were so many kills; each goes on until it is complete.
+def kill_export(kills: int, folder: Path, count: int = COUNT) -> dict[str, Any]:
+    """Kills exports of `count` samples until there were so many kills; each goes on until it is complete.
 
     Raises:
         AssertionError: if a shard is seen that is not whole, or a manifest before all are, or the bytes are others.
@@ -54,14 +55,14 @@ def kill_export(kills: int, folder: Path) -> dict[str, Any]:
     lasts = []
     for number, engine in enumerate(ENGINES):
         began = time.monotonic()
-        finish(start(folder / f"whole-{number}", engine))
+        finish(start(folder / f"whole-{number}", engine, count))
         lasts.append(time.monotonic() - began)
     want = seen(folder / "whole-0")
     row = {"fault": "export", "kills": 0, "runs": 0, "same": 0, "whole_shards_seen": 0, "while_writing": 0}
     while row["kills"] < kills:
         out, way = folder / "data", row["runs"] % 2
         while True:
-            process = start(out, ENGINES[way])
+            process = start(out, ENGINES[way], count)
             if row["kills"] < kills and kill_within(process, lasts[way]):
                 row["kills"] += 1
                 found = seen(out)

@@ -24,7 +24,7 @@ def test_training_that_is_killed_ends_in_the_same_weights(tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_an_export_that_is_killed_leaves_whole_shards_alone(tmp_path: Path) -> None:
-    row = kill_export(3, tmp_path)
+    row = kill_export(3, tmp_path, count=80)
     assert row["kills"] == 3
     assert row["same"] == row["runs"] > 0
 
@@ -34,6 +34,6 @@ def test_a_server_that_is_killed_has_every_stroke(tmp_path: Path) -> None:
     pytest.importorskip("nicegui", reason="the app needs NiceGUI (pip install 'sketchcore[app]')")
     from kill_app import kill_app
 
-    row = kill_app(3, tmp_path)
-    assert row["kills"] == 3
+    row = kill_app(2, tmp_path)
+    assert row["kills"] == 2
     assert row["answered"] > 0

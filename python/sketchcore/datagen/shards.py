@@ -15,9 +15,9 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
-from sketchcore.camera import Camera
 from sketchcore.datagen.generate import Batch, generate
 from sketchcore.datagen.grammars import Grammar
 
@@ -100,21 +100,23 @@ def _members(index: int, batch: Batch, i: int) -> Iterator[tuple[str, bytes]]:
     stored = io.BytesIO()
     np.lib.format.write_array(stored, packed, version=(1, 0), allow_pickle=False)
     yield f"{key}.world.npy.gz", gzip.compress(stored.getvalue(), GZIP_LEVEL, mtime=0)
-    yield f"{key}.cameras.json", json.dumps([_camera(camera) for camera in batch.cameras[i]]).encode()
+    yield f"{key}.cameras.json", json.dumps([_camera(row) for row in batch.packed_cameras[i]]).encode()
     yield f"{key}.shape.json", batch.shapes[i].to_json().encode()
 
 
-def _png(drawing: np.ndarray[Any, np.dtype[np.uint8]]) -> bytes:
+def _png(drawing: NDArray[np.uint8]) -> bytes:
     stored = io.BytesIO()
     Image.fromarray(255 - drawing).save(stored, format="PNG", compress_level=PNG_LEVEL)
     return stored.getvalue()
 
 
-def _camera(camera: Camera) -> dict[str, Any]:
+def _camera(packed: NDArray[np.float64]) -> dict[str, Any]:
+    """What `sketchcore.Camera` takes, of a row as in `Camera.packed`."""
+    position, rotation, (fov, near, far) = packed[:3], packed[3:12].reshape(3, 3), packed[12:].tolist()
     return {
-        "position": camera.position.tolist(),
-        "rotation": camera.rotation.tolist(),
-        "fov_degrees": camera.fov_degrees,
-        "near": camera.near,
-        "far": camera.far,
+        "position": position.tolist(),
+        "rotation": rotation.tolist(),
+        "fov_degrees": fov,
+        "near": near,
+        "far": far,
     }
