@@ -11,6 +11,7 @@ import re
 import subprocess
 import sys
 import tarfile
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -198,6 +199,30 @@ def test_wrong_engines_and_places_are_refused(tmp_path: Path) -> None:
 def test_processes_write_the_same_bytes(exported: Path, tmp_path: Path) -> None:
     export(TASK, tmp_path / "data", engine="processes", workers=2)
     assert files(tmp_path / "data") == files(exported)
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="children are found in /proc")
+def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "sketchcore.cli", "generate", "--shards", "100", "--count", "100000"]
+    command += ["--engine", "processes", "--workers", "1", "-o", str(tmp_path)]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    until = time.monotonic() + 120
+    while not list(tmp_path.glob(".shard-*")) and time.monotonic() < until:
+        time.sleep(0.05)
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    process.kill()
+    process.wait()
+    assert children
+    while (left := [pid for pid in children if running(pid)]) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not left
+
+
+def running(pid: str) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
 
 
 def test_an_object_store_has_the_same_bytes(exported: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -84,5 +84,7 @@ def save_mesh(mesh: trimesh.Trimesh, path: str | os.PathLike[str]) -> None:
     suffix = Path(path).suffix.lower()
     if suffix not in MESH_SUFFIXES:
         raise ValueError(f"a mesh is saved as {', '.join(MESH_SUFFIXES)}; got {Path(path).name!r}")
-    content = mesh.export(file_type=suffix[1:])  # a file that trimesh opens stays open where the disk is full
+    content: str | bytes = mesh.export(
+        file_type=suffix[1:]
+    )  # a file of trimesh's own stays open where the disk is full
     write_atomically(path, content.encode() if isinstance(content, str) else content)
