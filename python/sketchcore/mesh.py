@@ -84,7 +84,6 @@ def save_mesh(mesh: trimesh.Trimesh, path: str | os.PathLike[str]) -> None:
     suffix = Path(path).suffix.lower()
     if suffix not in MESH_SUFFIXES:
         raise ValueError(f"a mesh is saved as {', '.join(MESH_SUFFIXES)}; got {Path(path).name!r}")
-    content: str | bytes = mesh.export(
-        file_type=suffix[1:]
-    )  # a file of trimesh's own stays open where the disk is full
+    # A file that trimesh itself opens stays open where the disk is full.
+    content: Any = mesh.export(file_type=suffix[1:])
     write_atomically(path, content.encode() if isinstance(content, str) else content)
