@@ -86,7 +86,7 @@ def on_ray(make: Make, numbers: Sequence[int], workers: int | None) -> Iterator[
             done, waiting = ray.wait(waiting)
             yield from ray.get(done)
     except ray.exceptions.RayTaskError as error:
-        raise error.as_instanceof_cause() from None
+        raise error.cause from None
     except ray.exceptions.RayError as error:
         raise RuntimeError(f"Ray gave up: {error}; the same command goes on with what is missing") from error
     finally:
