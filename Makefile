@@ -8,8 +8,9 @@ READY := $(VENV)/.ready
 BUILT := $(VENV)/.built
 CARGO_TARGET_DIR ?= target
 export CARGO_TARGET_DIR
+export PIP_QUIET := 1
 
-.PHONY: all format build lint test test-rust test-python demo bench clean
+.PHONY: all format build lint test test-rust test-python demo bench docs wheel clean
 
 all: format build lint test
 
@@ -60,6 +61,16 @@ bench: $(BUILT)
 	$(BIN)/sketchcore bench
 	cargo bench --quiet
 	$(BIN)/pytest --quiet benches
+
+# The guide and the API reference, as out/docs/docs/index.html; a warning is an error.
+docs: $(BUILT)
+	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going -c docs . out/docs
+
+# The wheel and the source distribution in out/dist; the wheel is installed in an empty environment, away from the
+# sources, and runs the demo there.
+wheel: $(READY)
+	$(BIN)/maturin build --release --sdist --quiet --out out/dist
+	packaging/try-wheel out/dist/*.whl
 
 clean:
 	rm -rf $(VENV) target out

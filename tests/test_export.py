@@ -292,11 +292,12 @@ def test_the_command_line_exports_and_goes_on(exported: Path, tmp_path: Path) ->
     assert "with --shards" in refused.stderr
 
 
-def test_they_are_read_without_sketchcore_as_the_guide_says(tmp_path: Path) -> None:
+def test_they_are_read_without_sketchcore_as_the_guide_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("webdataset")
-    export(Export(0, 8, 4, views=2), tmp_path / "data")
     guide = (ROOT / "docs" / "export.md").read_text()
-    (example,) = re.findall(r"```python\n(.*?)```", guide, re.DOTALL)
+    making, example = re.findall(r"```py(?:thon)?\n(.*?)```", guide, re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    exec(making, {})
     check = """
 import sys
 assert "sketchcore" not in sys.modules

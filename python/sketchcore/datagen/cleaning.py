@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sketchcore import _core
 from sketchcore.camera import VIEWPOINTS
+from sketchcore.datagen.hollow import hollow_out
 from sketchcore.datagen.thin import fill_thin
 from sketchcore.datagen.upright import facing, symmetry, turn
 from sketchcore.grids import CREASE_DEGREES
@@ -67,14 +68,14 @@ def place(
         ahead = facing(_voxels(points, corners, thin)[0])
         points, corners, cleaned = _clean(turned @ turn("y", ahead).T, faces)
         front = _named(turn(up).T @ turn("y", ahead)[0])
-    world, added = _voxels(points, corners, thin)
+    world, changed = _voxels(points, corners, thin)
     filled = _filled(points, corners, world)
     found |= cleaned | {
         "front": front,
         "faces": len(corners),
         **_edges(corners),
         "occupied": float(world.mean()),
-        "thin_voxels": added,
+        **changed,
         "symmetry": round(symmetry(world), 4),
         "filled": round(filled, 4),
     }
@@ -128,13 +129,17 @@ def _clean(
     return points, np.ascontiguousarray(kept, np.int32), found
 
 
-def _voxels(points: NDArray[np.float32], corners: NDArray[np.int32], thin: bool) -> tuple[NDArray[np.uint8], int]:
-    """The voxels of a mesh, and how many of them are there for what is thinner than they are."""
+def _voxels(
+    points: NDArray[np.float32], corners: NDArray[np.int32], thin: bool
+) -> tuple[NDArray[np.uint8], dict[str, int]]:
+    """The voxels of a mesh, how many of them are there for what is thinner, and how many are not for what is hollow."""
     solid = _core.voxelize_mesh(points.astype(np.float64), corners.astype(np.int64))
     world = fill_thin(points, corners, solid) if thin else solid
     if not world.any():
         raise LeftOutError("encloses nothing: a sheet, or thinner than a voxel all over")
-    return world, int(world.sum()) - int(solid.sum())
+    hollow = hollow_out(points, corners, world)
+    added, taken = int((world > solid).sum()), int((hollow < world).sum())
+    return hollow, {"thin_voxels": added, "hollow_voxels": taken}
 
 
 def _edges(corners: NDArray[np.int32]) -> dict[str, Any]:

@@ -109,6 +109,7 @@ class Report:
             "thinner than voxels in part (above 10 % of theirs)": sum(
                 o["thin_voxels"] > 0.1 * 64**3 * o["occupied"] for o in self.objects
             ),
+            "hollow, seen from where they are open": sum(o["hollow_voxels"] > 0 for o in self.objects),
             "not symmetric about z = 0 (below 0.9)": sum(o["symmetry"] < 0.9 for o in self.objects),
         }
         lines += [f"  {count} {what}" for what, count in repairs.items() if count]

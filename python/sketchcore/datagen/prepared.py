@@ -30,7 +30,7 @@ from sketchcore.grids import CREASE_DEGREES
 INDEX = "dataset.json"
 OBJECTS = "objects"
 SPLITS = ("train", "val", "test")
-VERSION = 1
+VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -53,14 +53,20 @@ class MeshObject:
         return self.vertices.astype(np.float64), self.faces.astype(np.int64)
 
     def frusta(self, cameras: NDArray[np.float64]) -> NDArray[np.uint8]:
-        """Its camera grids for packed cameras [n, 15], thin parts filled: uint8 [n, 64, 64, 64], 255 = all."""
+        """Its camera grids, as thin and hollow as its world, for packed cameras [n, 15]: uint8 [n, 64, 64, 64]."""
+        solid, world = _core.voxelize_mesh(*self.packed) > 0, self.world > 0
+        if (solid & ~world).any():
+            return _seen(world, cameras)
         cells: NDArray[np.uint8] = _core.mesh_frusta(*self.packed, cameras, 2)
-        thin = (self.world > 0) & (_core.voxelize_mesh(*self.packed) == 0)
-        if thin.any():
-            worlds = np.repeat(thin[None].astype(np.float32), len(cameras), axis=0)
-            shares = np.rint(255 * _core.to_camera_grid(worlds, cameras)).astype(np.uint8)
-            np.maximum(cells, shares, out=cells)
+        if (thin := world & ~solid).any():
+            np.maximum(cells, _seen(thin, cameras), out=cells)
         return cells
+
+
+def _seen(voxels: NDArray[np.bool_], cameras: NDArray[np.float64]) -> NDArray[np.uint8]:
+    worlds = np.repeat(voxels[None].astype(np.float32), len(cameras), axis=0)
+    shares: NDArray[np.uint8] = np.rint(255 * _core.to_camera_grid(worlds, cameras)).astype(np.uint8)
+    return shares
 
 
 def save_object(path: Path, item: MeshObject, found: Mapping[str, Any]) -> None:

@@ -7,6 +7,8 @@ a slab that covers a voxel's centre has more than one half of it inside, or goes
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
@@ -38,7 +40,25 @@ def fill_thin(
     shares = _core.mesh_shares(places, np.ascontiguousarray(faces, np.int64))
     # Beside what is thick nothing is thin: edges of boxes pass through voxels that are not half full.
     seen = np.where(maximum_filter(shares, 3) >= WHOLE, np.uint8(64), shares)
-    corners = (places[faces] + 0.5) * SIDE
+    filled = world.copy()
+    for points, normals in surface_points(places, faces):
+        _fill(filled, seen, points, normals)
+    return filled
+
+
+def touched(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> NDArray[np.bool_]:
+    """The voxels that a mesh's surface passes through, bool [64, 64, 64]: no way from face to face leads through it."""
+    grid = np.zeros((SIDE, SIDE, SIDE), bool)
+    for points, _ in surface_points(vertices, faces):
+        grid[_at(points)] = True
+    return grid
+
+
+def surface_points(
+    vertices: NDArray[np.floating], faces: NDArray[np.integer]
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Points all over a mesh, at most `SPACING` apart: [faces, points, 3] in voxels, and normals [faces, 3]."""
+    corners = (np.asarray(vertices, np.float64)[faces] + 0.5) * SIDE
     # From the longest edge, a to b, row by row to the corner that is left.
     edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=-1)
     order = (edges.argmax(axis=1)[:, None] + np.arange(3)) % 3
@@ -48,15 +68,13 @@ def fill_thin(
     longest = edges.max(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         steps = np.ceil(np.stack([longest, area / longest], axis=1) / SPACING)
-    filled = world.copy()
     for along, up in np.unique(steps[area > 0], axis=0).astype(int):
         which = np.flatnonzero((steps == (along, up)).all(axis=1) & (area > 0))
         s, t = (at.ravel() for at in np.meshgrid(np.arange(along + 1) / along, np.arange(up + 1) / up))
         weights = np.stack([(1 - s) * (1 - t), s * (1 - t), t], axis=1)
         for some in np.array_split(which, 1 + len(which) * len(weights) // _MOST):
             ends = np.stack([a[some], b[some], c[some]], axis=1)
-            _fill(filled, seen, weights @ ends, across[some] / area[some, None])
-    return filled
+            yield weights @ ends, across[some] / area[some, None]
 
 
 def _fill(

@@ -147,7 +147,7 @@ class ChainStage:
         return loss
 
     def under_way(self) -> dict[str, Tensor]:
-        """The chains of the batch: what takes to go on with them as if nothing had happened."""
+        """The chains of the batch: what it takes to go on with them as if nothing had happened."""
         chains = self._batch
         columns = [c.index for c in chains], [c.depth for c in chains], np.stack([c.prior for c in chains])
         return {name: torch.as_tensor(column) for name, column in zip(CHAINS, columns, strict=True)}
