@@ -24,6 +24,7 @@ from sketchcore.train import PRESETS, Run, train
 from sketchcore.train.beginning import read_beginning
 from sketchcore.train.chains import ChainStage, start_chain
 from sketchcore.train.checkpoint import load_checkpoint
+from sketchcore.train.loop import _Loop
 from sketchcore.train.optimizers import FilterMuon, make_optimizers
 from sketchcore.train.presets import grammar_changes
 
@@ -210,6 +211,56 @@ def test_ctrl_c_saves_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     with pytest.raises(KeyboardInterrupt):
         train(tiny(tmp_path, steps=9), quiet=True)
     assert load_checkpoint(tmp_path / "compact.checkpoint.safetensors").progress.step == 2
+
+
+EXACT = {
+    "compact": (TINY, {"batch": 3, "warmup": 2, "threads": 2}),
+    "paper": ({"width": 4}, {"batch": 2}),
+}
+
+
+@pytest.mark.parametrize("preset", EXACT)
+def test_a_run_that_was_stopped_ends_in_the_same_weights(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, preset: str
+) -> None:
+    for module in ("chains", "papertrain"):
+        monkeypatch.setattr(f"sketchcore.train.{module}.heldout_iou", lambda *_, **__: [0.0])
+    options, changes = EXACT[preset]
+    whole, parts = (Run(tmp_path / name, preset, steps=9, options=options, changes=changes) for name in ("a", "b"))
+    train(whole, quiet=True)
+    save, saves = _Loop._save, []
+
+    def stopped(loop: _Loop) -> None:
+        save(loop)
+        saves.append(1)
+        if len(saves) in stops:
+            raise KeyboardInterrupt
+
+    stops = (2, 5, 11)
+    monkeypatch.setattr(_Loop, "_save", stopped)
+    parts = replace(parts, save_every=0.0)
+    for stop in stops:
+        with pytest.raises(KeyboardInterrupt):
+            train(parts, resume=stop != stops[0], quiet=True)
+    monkeypatch.setattr(_Loop, "_save", save)
+    train(parts, resume=True, quiet=True)
+    assert (whole.out / "weights.safetensors").read_bytes() == (parts.out / "weights.safetensors").read_bytes()
+    for name in PRESETS[preset].stages:
+        one, two = (load_checkpoint(run.out / f"{name}.checkpoint.safetensors") for run in (whole, parts))
+        assert one.progress.samples == two.progress.samples
+        assert all(torch.equal(one.model[key], two.model[key]) for key in one.model)
+        assert all(torch.equal(one.under_way[key], two.under_way[key]) for key in one.under_way)
+        for number, moments in one.moments.items():
+            for index, states in moments.items():
+                assert all(torch.equal(t, two.moments[number][index][key]) for key, t in states.items())
+
+
+def test_a_checkpoint_of_another_batch_starts_new_chains(tmp_path: Path) -> None:
+    train(tiny(tmp_path, steps=2), quiet=True)
+    before = load_checkpoint(tmp_path / "compact.checkpoint.safetensors").progress
+    assert before.samples >= 2
+    [after] = train(replace(tiny(tmp_path, steps=3), changes={"batch": 3}), resume=True, quiet=True)
+    assert after.samples == before.samples + 3
 
 
 def test_a_chain_is_a_function_of_seed_and_index() -> None:

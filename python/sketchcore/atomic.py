@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+_FULL = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the quota is used up", errno.EFBIG: "the file is too large"}
 
 
 @contextmanager
@@ -17,6 +20,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
 
     Raises:
         FileNotFoundError: if the folder does not exist.
+        OSError: if the disk is full; the message says which file is missing for it.
     """
     target = Path(path)
     if not target.parent.is_dir():
@@ -27,8 +31,20 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         with fresh.open("rb+") as file:
             os.fsync(file.fileno())
         fresh.replace(target)
+    except OSError as error:
+        if error.errno not in _FULL:
+            raise
+        was = "is as it was before" if target.exists() else "was not written"
+        raise OSError(error.errno, f"{_FULL[error.errno]}; {target} {was}") from error
     finally:
         fresh.unlink(missing_ok=True)
+
+
+def sweep(path: str | os.PathLike[str]) -> None:
+    """Takes away what is left in the folder of writers of a file that were killed. None may be writing it."""
+    target = Path(path)
+    for left in target.parent.glob(f".{target.stem}-{'[0-9a-f]' * 8}{target.suffix}"):
+        left.unlink(missing_ok=True)
 
 
 def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:

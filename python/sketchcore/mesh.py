@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sketchcore import _core
-from sketchcore.atomic import replacing
+from sketchcore.atomic import write_atomically
 from sketchcore.volume import as_probability
 
 # Imported by what needs them: half a second and 40 MB, and a reconstruction alone makes no mesh.
@@ -84,5 +84,6 @@ def save_mesh(mesh: trimesh.Trimesh, path: str | os.PathLike[str]) -> None:
     suffix = Path(path).suffix.lower()
     if suffix not in MESH_SUFFIXES:
         raise ValueError(f"a mesh is saved as {', '.join(MESH_SUFFIXES)}; got {Path(path).name!r}")
-    with replacing(path) as temporary:
-        mesh.export(temporary, file_type=suffix[1:])
+    # A file that trimesh itself opens stays open where the disk is full.
+    content: Any = mesh.export(file_type=suffix[1:])
+    write_atomically(path, content.encode() if isinstance(content, str) else content)

@@ -34,7 +34,7 @@ from sketchcore.app.examples import read_scene, read_tour
 from sketchcore.app.guard import TooLargeError
 from sketchcore.app.session import Session
 from sketchcore.app.sessionfile import MAX_FILE, SUFFIX
-from sketchcore.app.store import Store
+from sketchcore.app.store import NotKeptError, Store
 from sketchcore.app.workers import Reconstruct, Workers
 from sketchcore.camera import check_viewpoint
 from sketchcore.mesh import MESH_SUFFIXES, extract_mesh, save_mesh
@@ -82,6 +82,8 @@ class _Route(APIRoute):
                 return _error(404, error)
             except (ValueError, TypeError) as error:
                 return _error(400, error)
+            except NotKeptError as error:
+                return _error(507, error)
 
         return careful
 
@@ -145,6 +147,7 @@ class Server:
         Raises:
             KeyError: if there is no such session or change.
             ValueError: for whatever cannot be done; a sentence for people.
+            NotKeptError: if it was done and cannot be kept; asked again, it is kept, and not done again.
         """
         session = self.store.get(id)
         if name not in _CHANGES:
@@ -153,10 +156,12 @@ class Server:
         if missing:
             raise ValueError(f"{name} needs {', '.join(_CHANGES[name])}; there is no {missing[0]}")
         with session.lock:
-            if self._was_done(session, body.get("op")):
-                return sent_state(session)
-            _apply(session, name, body)
-            self._remember(session, body.get("op"))
+            repeated = self._was_done(session, body.get("op"))
+            if not repeated:
+                _apply(session, name, body)
+                self._remember(session, body.get("op"))
+        if repeated:
+            return self.changed(session)  # it may not have been kept the first time
         if name == "reconstruct":
             self.workers.submit(session)
         elif not session.document.inked:

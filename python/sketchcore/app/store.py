@@ -29,12 +29,16 @@ from sketchcore.app.history import History
 from sketchcore.app.session import Session
 from sketchcore.app.sessionfile import describe, parse_json, parse_volume, read_session, recall, write_session
 from sketchcore.app.solids import Solid
-from sketchcore.atomic import write_atomically
+from sketchcore.atomic import sweep, write_atomically
 
 _log = logging.getLogger(__name__)
 _ID = re.compile(r"[0-9a-f]{32}")
 _AT_HAND = 16
 """Sessions that stay in memory without being in use."""
+
+
+class NotKeptError(RuntimeError):
+    """A session could not be written: it is on the disk as it was before, and in memory as it is now."""
 
 
 class Listed(NamedTuple):
@@ -66,7 +70,11 @@ class Store:
         self._names: dict[str, tuple[int, str]] = {}
 
     def create(self) -> Session:
-        """A new, empty session, kept from now on."""
+        """A new, empty session, kept from now on.
+
+        Raises:
+            NotKeptError: if it cannot be written.
+        """
         return self._adopt(Session())
 
     def get(self, id: str) -> Session:
@@ -100,23 +108,23 @@ class Store:
         return sorted(found, key=lambda one: one.changed, reverse=True)
 
     def save(self, session: Session) -> None:
-        """Keeps a session as it is now: whole, or as it was before. One that was deleted stays deleted."""
+        """Keeps a session as it is now: whole, or as it was before. One that was deleted stays deleted.
+
+        Raises:
+            NotKeptError: if the disk is full, or cannot be written to.
+        """
         with self._lock:
             saving = self._saving.setdefault(session.id, threading.Lock())
         with saving:  # whoever saves later saves what is newer
             if self._held.get(session.id) is not session:
                 return
-            kept = session.kept()
-            place = self.folder / session.id
-            for key, volume in kept.volumes.items():
-                _write_volume(place / "volumes" / f"{key}.npy.gz", volume)
-            record = {"revision": kept.revision, **describe(kept)}
-            write_atomically(place / "session.json", json.dumps(record, allow_nan=False).encode())
-            _append(place / "history.jsonl", kept.news)
-            session.told(len(kept.news))
-            for file in (place / "volumes").iterdir():
-                if file.name.startswith(".") or file.name.split(".")[0] not in kept.volumes:
-                    file.unlink(missing_ok=True)
+            try:
+                self._write(session, self.folder / session.id)
+            except OSError as error:
+                raise NotKeptError(
+                    f"this could not be kept on the disk ({os.strerror(error.errno or 0)}); it is kept with the next "
+                    "change, once there is room"
+                ) from error
 
     def delete(self, id: str) -> None:
         """Takes a session away for good.
@@ -145,16 +153,38 @@ class Store:
         """The session as a file."""
         return write_session(session)
 
+    def _write(self, session: Session, place: Path) -> None:
+        kept = session.kept()
+        for key, volume in kept.volumes.items():
+            _write_volume(place / "volumes" / f"{key}.npy.gz", volume)
+        record = {"revision": kept.revision, **describe(kept)}
+        write_atomically(place / "session.json", json.dumps(record, allow_nan=False).encode())
+        _append(place / "history.jsonl", kept.news)
+        session.told(len(kept.news))
+        for file in (place / "volumes").iterdir():
+            if file.name.startswith(".") or file.name.split(".")[0] not in kept.volumes:
+                file.unlink(missing_ok=True)
+
     def _place(self, id: object) -> Path:
         if not isinstance(id, str) or not _ID.fullmatch(id) or not (self.folder / id / "session.json").is_file():
             raise KeyError(f"there is no session {str(id)[:40]!r}")
         return self.folder / id
 
     def _adopt(self, session: Session) -> Session:
-        (self.folder / session.id / "volumes").mkdir(parents=True)
-        with self._lock:
-            self._hold(session)
-        self.save(session)
+        place = self.folder / session.id
+        try:
+            (place / "volumes").mkdir(parents=True)
+            with self._lock:
+                self._hold(session)
+            self.save(session)
+        except (OSError, NotKeptError) as error:
+            with self._lock:
+                self._held.pop(session.id, None)
+                self._recent.pop(session.id, None)
+            shutil.rmtree(place, ignore_errors=True)
+            if isinstance(error, NotKeptError):
+                raise
+            raise NotKeptError(f"a session cannot be begun on the disk ({os.strerror(error.errno or 0)})") from error
         return session
 
     def _hold(self, session: Session) -> Session:
@@ -165,6 +195,8 @@ class Store:
         return session
 
     def _load(self, place: Path) -> Session:
+        for name in ("session.json", "history.jsonl"):
+            sweep(place / name)
         record = _read(place)
         revision = record.pop("revision", None)
         if type(revision) is not int:
@@ -181,15 +213,20 @@ class Store:
 
 
 def _append(path: Path, lines: Sequence[str]) -> None:
-    """Adds lines to a history; if it begins anew, in the place of what was there."""
+    """Adds lines to a history, all or none; if it begins anew, in the place of what was there."""
     text = "".join(f"{line}\n" for line in lines).encode()
     if lines and lines[0].startswith('{"begin"'):
         write_atomically(path, text)
     elif lines:
-        with path.open("ab") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
+        with path.open("ab", buffering=0) as file:
+            end, rest = file.tell(), memoryview(text)
+            try:
+                while rest:
+                    rest = rest[file.write(rest) :]
+                os.fsync(file.fileno())
+            except OSError:
+                file.truncate(end)
+                raise
 
 
 def _read_history(path: Path, document: Document, files: Collection[str]) -> History:

@@ -12,6 +12,7 @@ from PIL import Image
 from sketchcore.atomic import replacing
 from sketchcore.datagen.generate import Batch, generate
 from sketchcore.datagen.grammars import Grammar
+from sketchcore.mesh import save_mesh
 from sketchcore.solidmesh import require_manifold
 
 _CHUNK = 16
@@ -96,8 +97,7 @@ def write_meshes(
     folder.mkdir(parents=True, exist_ok=True)
     for i in range(count):
         (shape,) = generate(seed, 1, first=first + i, config=config, grammar=grammar).shapes
-        with replacing(folder / f"{first + i:09d}.{suffix}") as fresh:
-            shape.to_mesh().export(fresh, file_type=suffix)
+        save_mesh(shape.to_mesh(), folder / f"{first + i:09d}.{suffix}")
         if progress is not None:
             progress(i + 1)
 

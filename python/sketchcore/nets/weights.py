@@ -17,7 +17,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save
 from torch import Tensor
 
-from sketchcore.atomic import write_atomically
+from sketchcore.atomic import replacing
 
 SUFFIX = ".safetensors"
 PRETRAINED = cast(Path, files("sketchcore") / "pretrained" / "compact.safetensors")
@@ -63,8 +63,9 @@ def save_weights(
         for name, tensor in state_dict.items()
     }
     _refuse_non_finite(stored, f"to be stored as {dtype or 'they are'}")
-    write_atomically(path.with_suffix(".json"), text.encode())
-    write_atomically(path, save(stored))
+    with replacing(path) as weights, replacing(path.with_suffix(".json")) as beside:
+        beside.write_bytes(text.encode())  # both fit on the disk, or neither takes its place
+        weights.write_bytes(save(stored))
 
 
 def load_weights(path: str | os.PathLike[str]) -> tuple[dict[str, Tensor], dict[str, Any]]:

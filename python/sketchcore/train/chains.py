@@ -7,7 +7,8 @@ new shape.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -32,6 +33,8 @@ DRAWINGS = (0.4, 0.25, 0.2, 0.15)
 """Shares of the chains with one, two, three and four drawings."""
 PASSES = (0.75, 0.15, 0.1)
 """Shares of the chains with one, two and three passes."""
+CHAINS = ("index", "depth", "prior")
+"""What a checkpoint keeps of each chain; drawings and truth are made again from its index."""
 
 
 @dataclass
@@ -44,6 +47,7 @@ class Chain:
         length: passes it goes through.
         depth: passes it went through.
         prior: float32 [64, 64, 32], the latest prediction; zeros before the first.
+        index: its number, which says what it is of.
     """
 
     sketches: Sketches
@@ -51,6 +55,7 @@ class Chain:
     length: int
     depth: int
     prior: NDArray[np.float32]
+    index: int = 0
 
 
 def start_chain(preset: Preset, seed: int, index: int, data: Prepared | None = None) -> Chain:
@@ -68,6 +73,7 @@ def start_chain(preset: Preset, seed: int, index: int, data: Prepared | None = N
         length,
         0,
         np.zeros((64, 64, 32), np.float32),
+        index,
     )
     _ = chain.sketches.evidence  # on the thread that makes the chain
     return chain
@@ -89,13 +95,32 @@ class ChainStage:
         samples: int,
         config: CompactConfig,
         data: Prepared | None = None,
+        under_way: Mapping[str, Tensor] | None = None,
     ) -> None:
+        """Starts the threads that make chains, and the first ones.
+
+        Args:
+            preset: constants.
+            seed: of the shapes.
+            device: where to train.
+            samples: how many shapes were started before.
+            config: of the network.
+            data: data set of meshes; None for the preset's grammar.
+            under_way: what `under_way` said when the run was left, to go on with the same chains. If it is of another
+                number of chains than the preset's batch, new ones are started.
+        """
         self.model = place(CompactNet(config), device)
         self._device, self._grammar, self._data = device, preset.grammar, data
         self._loss = distance_loss if preset.truth == "distance" else occupancy_loss
         self.samples = 0
         self._chains = Ahead(partial(start_chain, preset, seed, data=data), samples, 2 * preset.batch, preset.threads)
-        self._batch = [self._next() for _ in range(preset.batch)]
+        if under_way and len(under_way["index"]) == preset.batch:
+            self._batch = [
+                replace(start_chain(preset, seed, int(index), data), depth=int(depth), prior=prior.numpy())
+                for index, depth, prior in zip(*(under_way[name] for name in CHAINS), strict=True)
+            ]
+        else:
+            self._batch = [self._next() for _ in range(preset.batch)]
 
     @property
     def waited(self) -> float:
@@ -120,6 +145,12 @@ class ChainStage:
             chain.prior = prediction
             chain.depth += 1
         return loss
+
+    def under_way(self) -> dict[str, Tensor]:
+        """The chains of the batch: what it takes to go on with them as if nothing had happened."""
+        chains = self._batch
+        columns = [c.index for c in chains], [c.depth for c in chains], np.stack([c.prior for c in chains])
+        return {name: torch.as_tensor(column) for name, column in zip(CHAINS, columns, strict=True)}
 
     def measure(self, net: nn.Module) -> float:
         """The held-out IoU of a network like the model: from one drawing and from three, after a round."""

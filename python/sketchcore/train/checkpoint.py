@@ -51,13 +51,19 @@ def save_checkpoint(
     moments: Sequence[Mapping[int, Mapping[str, Any]]],
     progress: Progress,
     task: Mapping[str, str],
+    under_way: Mapping[str, Tensor],
 ) -> None:
-    """Writes weights, their average, the optimisers' moments, the progress and the task, atomically, as safetensors."""
+    """Writes all that a run goes on from, atomically, as safetensors: see `Checkpoint`.
+
+    The state of torch's random numbers on the CPU is kept too: dropout goes on with it.
+    """
     tensors = {f"model.{name}": t for name, t in model.items()}
     tensors |= {f"average.{name}": t for name, t in average.items()}
     for number, states in enumerate(moments):
         for index, state in states.items():
             tensors |= {f"optimizer.{number}.{index}.{name}": torch.as_tensor(t) for name, t in state.items()}
+    tensors |= {f"under_way.{name}": t for name, t in under_way.items()}
+    tensors["random.cpu"] = torch.get_rng_state()
     stored = {name: t.detach().cpu().contiguous().clone() for name, t in tensors.items()}
     said = {"progress": json.dumps(asdict(progress)), "task": json.dumps(dict(task))}
     write_atomically(path, save(stored, metadata=said))
@@ -65,13 +71,25 @@ def save_checkpoint(
 
 @dataclass
 class Checkpoint:
-    """What `save_checkpoint` wrote: state dictionaries, moments by optimiser and parameter, progress and task."""
+    """What `save_checkpoint` wrote.
+
+    Attributes:
+        model: state dictionary of the weights, and
+        average: of their average.
+        moments: by optimiser and parameter.
+        progress: how far the stage has come.
+        task: what is learnt.
+        under_way: what the stage had begun (`ChainStage.under_way`).
+        random: state of torch's random numbers; None in a checkpoint from before it was kept.
+    """
 
     model: dict[str, Tensor]
     average: dict[str, Tensor]
     moments: dict[int, dict[int, dict[str, Tensor]]]
     progress: Progress
     task: dict[str, str]
+    under_way: dict[str, Tensor]
+    random: Tensor | None
 
 
 def load_checkpoint(path: Path) -> Checkpoint:
@@ -83,8 +101,7 @@ def load_checkpoint(path: Path) -> Checkpoint:
     """
     if not path.is_file():
         raise FileNotFoundError(f"no checkpoint at {path}; start without --resume")
-    model: dict[str, Tensor] = {}
-    average: dict[str, Tensor] = {}
+    kinds: dict[str, dict[str, Tensor]] = {"model": {}, "average": {}, "under_way": {}, "random": {}}
     moments: dict[int, dict[int, dict[str, Tensor]]] = {}
     try:
         with safe_open(path, framework="pt") as file:
@@ -97,7 +114,8 @@ def load_checkpoint(path: Path) -> Checkpoint:
                     of_parameter = moments.setdefault(int(number), {}).setdefault(int(index), {})
                     of_parameter[moment] = file.get_tensor(key)
                 else:
-                    (model if kind == "model" else average)[name] = file.get_tensor(key)
+                    kinds[kind][name] = file.get_tensor(key)
     except (SafetensorError, KeyError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is no checkpoint of sketchcore train: {error}") from error
-    return Checkpoint(model, average, moments, progress, task)
+    under_way, random = kinds["under_way"], kinds["random"].get("cpu")
+    return Checkpoint(kinds["model"], kinds["average"], moments, progress, task, under_way, random)

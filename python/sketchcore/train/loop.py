@@ -15,6 +15,7 @@ from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 from torch import Tensor, nn
 
+from sketchcore.atomic import sweep
 from sketchcore.datagen.prepared import Prepared
 from sketchcore.nets.compact import CompactConfig, CompactNet
 from sketchcore.nets.multiscale import MultiscaleNet
@@ -48,6 +49,10 @@ class Stage(Protocol):
 
     def step(self) -> Tensor:
         """The loss of the next batch."""
+        ...
+
+    def under_way(self) -> dict[str, Tensor]:
+        """What it had begun, for a checkpoint."""
         ...
 
     def measure(self, net: nn.Module) -> float:
@@ -161,6 +166,8 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
         raise FileExistsError(f"{existing[0]} exists; go on from it with --resume, or name another folder")
     if resume and not existing:
         raise FileNotFoundError(f"no checkpoint in {run.out}; start without --resume")
+    for path in (*checkpoints.values(), run.out / "weights.safetensors", run.out / "weights.json"):
+        sweep(path)
     device = pick_device(run.device)
     trained: dict[str, Network] = {}
     results = []
@@ -175,7 +182,7 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
         # A later stage that has begun shows that this one is done.
         begun = any(checkpoints[later].exists() for later in stages[index + 1 :])
         progress = found.progress if found else Progress(name, began=beginning.record if beginning else None)
-        stage = _stage(run, progress, device, trained, data)
+        stage = _stage(run, progress, device, trained, data, found)
         try:
             if beginning and name in beginning.states:
                 _fill(stage.model, beginning.states[name])
@@ -189,13 +196,19 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
 
 
 def _stage(
-    run: Run, progress: Progress, device: torch.device, trained: dict[str, Network], data: Prepared | None
+    run: Run,
+    progress: Progress,
+    device: torch.device,
+    trained: dict[str, Network],
+    data: Prepared | None,
+    found: Checkpoint | None,
 ) -> Stage:
     torch.manual_seed(run.seed)
     name, samples = progress.stage, progress.samples
     constants, options = run.constants, run.options or (progress.began or {}).get("options", {})
     if name == "compact":
-        return ChainStage(constants, run.seed, device, samples, CompactConfig.of_options(options), data)
+        config, under_way = CompactConfig.of_options(options), found.under_way if found else None
+        return ChainStage(constants, run.seed, device, samples, config, data, under_way)
     if name == "updater":
         single = trained["single"]
         assert isinstance(single, PaperNet)
@@ -239,6 +252,8 @@ class _Loop:
                 self.average.load_state_dict(found.average)
             for number, optimizer in enumerate(self.optimizers):
                 optimizer.load_state_dict({**optimizer.state_dict(), "state": found.moments.get(number, {})})
+            if found.random is not None:
+                torch.set_rng_state(found.random)
 
     def go(self, share: float, quiet: bool) -> Progress:
         """Trains to the end of the stage's share of the run."""
@@ -309,7 +324,8 @@ class _Loop:
     def _save(self) -> None:
         average = self.average.state_dict() if self.constants.average else {}
         moments = [optimizer.state_dict()["state"] for optimizer in self.optimizers]
-        save_checkpoint(self.path, self.stage.model.state_dict(), average, moments, self.progress, self.task)
+        model, under_way = self.stage.model.state_dict(), self.stage.under_way()
+        save_checkpoint(self.path, model, average, moments, self.progress, self.task, under_way)
 
 
 @torch.no_grad()

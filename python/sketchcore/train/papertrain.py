@@ -73,6 +73,10 @@ class SingleStage:
             logits = self.model(drawing)
         return paper_loss(logits.float(), unit(in_camera_grids(self._truth, batch.frusta[:, 0]), self._device))
 
+    def under_way(self) -> dict[str, Tensor]:
+        """Nothing: each batch is new, and says by its number what is in it."""
+        return {}
+
     def measure(self, net: nn.Module) -> float:
         """The held-out IoU of a network like the model: from one drawing."""
         assert isinstance(net, PaperNet | MultiscaleNet)
@@ -130,6 +134,10 @@ class UpdaterStage:
         world = np.zeros_like(predictions)
         _core.to_world_grid(predictions, np.ascontiguousarray(batch.packed_cameras[:, 0]), world)
         return _core.to_camera_grid(world, np.ascontiguousarray(batch.packed_cameras[:, 1]))
+
+    def under_way(self) -> dict[str, Tensor]:
+        """Nothing: each batch is new, and says by its number what is in it."""
+        return {}
 
     def measure(self, net: nn.Module) -> float:
         """The held-out IoU of a network like the model: from two drawings, after a round."""
