@@ -24,9 +24,10 @@ import sketchcore
 
 PACKAGE = Path(sketchcore.__file__).parent
 SCRATCH = Path(tempfile.mkdtemp(prefix="sketchcore-fuzz-"))
-"""Where targets put the files that they have read."""
+"""Where targets put the files that they read, and where whatever is temporary goes."""
+tempfile.tempdir = str(SCRATCH)
 SECONDS = 10.0
-"""For one input."""
+"""Of the processor, for one input: other processes may have it as well."""
 _FORBIDDEN = ("socket.", "subprocess.", "os.system", "os.exec", "os.posix_spawn", "pickle.find_class", "webbrowser.")
 _LIBRARIES = tuple({str(Path(path).resolve()) for path in (sys.prefix, sys.base_prefix, PACKAGE)}) + ("/proc/", "/sys/")
 """Where code and its data lie: imports open files as well."""
@@ -96,15 +97,15 @@ def _watching() -> Iterator[None]:
         raise HangError(f"more than {SECONDS:g} seconds")
 
     _trespasses.clear()
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, SECONDS)
+    before = signal.signal(signal.SIGPROF, ring)
+    signal.setitimer(signal.ITIMER_PROF, SECONDS)
     _watched = True
     try:
         yield
     finally:
         _watched = False
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def judge(target: Target, data: bytes) -> Finding | None:

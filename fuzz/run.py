@@ -22,13 +22,14 @@ from typing import Any
 
 HERE = Path(__file__).parent
 TARGETS = sorted(path.stem for path in (HERE / "targets").glob("[a-z]*.py"))
-PATIENCE = 30.0
+PATIENCE = 90.0
 """Seconds without a sign of life, after which the process is ended and the input counts as a hang."""
 
 
 def fuzz(name: str, engine: str, budget: float, seed: int, findings: Path) -> dict[str, Any]:
     """Fuzzes a target; a process that dies is told of, and followed by another."""
-    folder = Path(tempfile.mkdtemp(prefix=f"sketchcore-fuzz-{name}-"))
+    memory = Path("/dev/shm")  # files that are synced to a disk would be what takes longest
+    folder = Path(tempfile.mkdtemp(prefix=f"sketchcore-fuzz-{name}-", dir=memory if memory.is_dir() else None))
     began, executions, peak, deaths = time.monotonic(), 0, 0, 0
     while True:
         left = budget - (time.monotonic() - began) if engine == "atheris" else budget

@@ -27,12 +27,11 @@ def attempt(data: bytes) -> None:
     source.choice(_CALLS)(source)
 
 
-def _floats(source: Source, count: int) -> NDArray[np.float64]:
-    """Numbers near one mostly, and some of the special ones."""
+def _floats(source: Source, count: int, scale: Any = 1.0) -> NDArray[np.float64]:
+    """Numbers near the scale mostly, and some of the special ones."""
     raw = np.frombuffer(source.take(2 * count), "<i2")
-    values = raw / 16384
     special = source.below(4) == 0
-    return np.where((raw % 8 == 0) & special, np.array(_SPECIAL)[raw // 8 % len(_SPECIAL)], values)
+    return np.where((raw % 8 == 0) & special, np.array(_SPECIAL)[raw // 8 % len(_SPECIAL)], raw / 16384 * scale)
 
 
 def _mesh(source: Source) -> trimesh.Trimesh:
@@ -54,10 +53,10 @@ def _camera(source: Source) -> sk.Camera:
             return sk.Camera.from_packed(_floats(source, 15))
         case 2:
             turn = np.eye(3)[:, np.roll((0, 1, 2), source.below(3))]
-            fov, near, far = np.abs(_floats(source, 3)) * (90, 1, 1)
+            fov, near, far = np.abs(_floats(source, 3, (90, 1, 1)))
             return sk.Camera(_floats(source, 3), turn, fov, near, far)
         case _:
-            azimuth, elevation, distance, fov = _floats(source, 4) * (360, 90, 2, 90)
+            azimuth, elevation, distance, fov = _floats(source, 4, (360, 90, 2, 90))
             return sk.Camera.orbit(azimuth, elevation, distance, fov_degrees=fov)
 
 
@@ -75,7 +74,7 @@ def _shape(source: Source) -> sk.Shape:
             case 3:
                 return sk.Frustum(center, half, axis, _floats(source, 2), _floats(source, 2), bool(source.below(2)), op)
             case _:
-                return sk.Torus(center, half, axis, abs(_floats(source, 1)[0]) / 4, _floats(source, 2) * 180, op)
+                return sk.Torus(center, half, axis, abs(_floats(source, 1, 0.25)[0]), _floats(source, 2, 180), op)
 
     return sk.Shape(one() for _ in range(1 + source.below(6)))
 
@@ -83,11 +82,11 @@ def _shape(source: Source) -> sk.Shape:
 def _any(source: Source) -> NDArray[Any]:
     """An array of any dtype and a shape that fits somewhere, or nowhere."""
     shape = source.choice(((64,) * 3, (1, 64, 64, 64), (256, 256), (2, 256, 256), (32,) * 3, (5, 7), (40, 30, 3), (8, 9, 4), (),
-                           (0,), (0, 64, 64, 64), (64, 64), (1, 1), (3, 3, 3), (256, 256, 256)))  # fmt: skip
+                           (0,), (0, 64, 64, 64), (64, 64), (1, 1), (3, 3, 3), (128, 128, 128)))  # fmt: skip
     dtype = np.dtype(source.choice(_KINDS))
     count = int(np.prod(shape))
     scale = source.choice((1, 1, 255, 1e9))
-    values = np.resize(np.abs(_floats(source, 64)) * scale, count).reshape(shape)
+    values = np.resize(np.abs(_floats(source, 64, scale)), count).reshape(shape)
     if source.below(2):
         values = np.where(np.resize(values, count).reshape(shape) > 0.9, 1.0, 0.0)
     with np.errstate(all="ignore"):
@@ -100,7 +99,7 @@ def _of_mesh(source: Source) -> None:
     if call == 0:
         assert sk.voxelize(mesh).max() <= 1
     elif call == 1:
-        sk.draw(mesh, _camera(source), crease_degrees=float(_floats(source, 1)[0] * 90))
+        sk.draw(mesh, _camera(source), crease_degrees=float(_floats(source, 1, 90)[0]))
     elif call == 2:
         depth, normal = sk.buffers(mesh, _camera(source), 1 + source.below(64))
         assert not np.isnan(depth).any()

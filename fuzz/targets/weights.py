@@ -14,10 +14,13 @@ from safetensors.torch import save
 import sketchcore as sk
 from sketchcore.nets.compact import CompactConfig, CompactNet
 from sketchcore.nets.multiscale import MultiscaleNet
+from sketchcore.nets.sketches import Sketches
 from sketchcore.nets.unet import PaperNet
 from sketchcore.train.checkpoint import load_checkpoint
 
 torch.set_num_threads(1)
+_CAMERA = sk.VIEWPOINTS["quarter-037"]
+_SKETCHES = Sketches(sk.draw(sk.Shape([sk.Cuboid((0, 0, 0), (0.3, 0.2, 0.2))]), _CAMERA)[None], _CAMERA.packed[None])
 
 
 def attempt(data: bytes) -> None:
@@ -28,8 +31,10 @@ def attempt(data: bytes) -> None:
     path.write_bytes(data[5 + size :])
     if data[:1] == b"k":
         load_checkpoint(path)
-    else:
-        sk.load_model(path, "cpu")
+        return
+    model = sk.load_model(path, "cpu")
+    volume = next(iter(model.first_predictions([_SKETCHES])))
+    assert volume.shape == (64, 64, 64)
 
 
 def _input(kind: bytes, config: bytes, weights: bytes) -> bytes:
@@ -39,7 +44,7 @@ def _input(kind: bytes, config: bytes, weights: bytes) -> bytes:
 def seeds() -> list[bytes]:
     """Small networks of each kind, a checkpoint, and a pickle."""
     torch.manual_seed(0)
-    tiny = CompactConfig(4, (4, 4, 4), 2, 4, (4, 4, 4), 2)
+    tiny = CompactConfig(4, (4, 4, 8), 2, 4, (4, 4, 8), 2)
     compact, paper, multiscale = CompactNet(tiny), PaperNet(width=1), MultiscaleNet(width=2)
     nets = [
         ({"network": "compact", "options": compact.describe()}, compact.state_dict()),

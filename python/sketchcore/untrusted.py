@@ -55,9 +55,9 @@ def parse_json(text: bytes | str, what: str) -> Any:
     try:
         return json.loads(text, parse_constant=refuse)
     except UnicodeDecodeError as error:
-        raise ValueError(f"{what} is no text in UTF-8") from error
+        raise ValueError(f"{what} is not valid JSON: it is no text in UTF-8") from error
     except json.JSONDecodeError as error:
-        raise ValueError(f"{what} is damaged: it is not valid JSON: {error}") from error
+        raise ValueError(f"{what} is damaged; it is not valid JSON: {error}") from error
     except RecursionError as error:
         raise ValueError(f"{what} is nested too deeply") from error
 

@@ -10,7 +10,7 @@ round.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,10 @@ from sketchcore.nets.precision import unit
 from sketchcore.nets.sketches import Sketches
 
 
+MAX_WIDTH = 4096
+"""Channels of any layer."""
+
+
 @dataclass(frozen=True)
 class CompactConfig:
     """Widths (channels) of `CompactNet`.
@@ -37,6 +41,9 @@ class CompactConfig:
         fused: of what a cell reads from one drawing.
         world: of the decoder with 32, 16 and 8 cells along x and y.
         groups: groups of each group normalisation.
+
+    Raises:
+        ValueError: for a width that is no whole number from 1 to 4096.
     """
 
     stem: int = 64
@@ -45,6 +52,15 @@ class CompactConfig:
     fused: int = 32
     world: tuple[int, int, int] = (32, 96, 192)
     groups: int = 8
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value, default = getattr(self, field.name), field.default
+            each = value if isinstance(default, tuple) and isinstance(value, tuple) else (value,)
+            if len(each) != (len(default) if isinstance(default, tuple) else 1):
+                raise ValueError(f"{field.name} must be {len(default)} widths, got {value!r:.80}")
+            if not all(type(width) is int and 1 <= width <= MAX_WIDTH for width in each):
+                raise ValueError(f"{field.name} must be whole, 1 to {MAX_WIDTH}, got {value!r:.80}")
 
     @classmethod
     def of_options(cls, options: Mapping[str, Any]) -> CompactConfig:
