@@ -86,8 +86,8 @@ def main() -> None:
             return bytes(atheris.Mutate(data, len(data)))
         return target.mutate(data, Random(chance))[:most]
 
-    options = [f"-max_total_time={budget}", f"-seed={seed}", "-max_len=1000000", "-rss_limit_mb=0", "-timeout=0"]
-    options += ["-len_control=0", "-print_final_stats=0", "-verbosity=0", "-reload=0"]
+    options = [f"-max_total_time={budget}", f"-seed={seed}", "-max_len=1000000", "-rss_limit_mb=0", "-timeout=3600"]
+    options += [f"-artifact_prefix={folder}/", "-len_control=0", "-print_final_stats=0", "-verbosity=0", "-reload=0"]
     atheris.Setup([sys.argv[0], *options, str(corpus)], trial.attempt, custom_mutator=mutate)
     try:
         atheris.Fuzz()
