@@ -29,7 +29,7 @@ tempfile.tempdir = str(SCRATCH)
 SECONDS = 10.0
 """Of the processor, for one input: other processes may have it as well."""
 _FORBIDDEN = ("socket.", "subprocess.", "os.system", "os.exec", "os.posix_spawn", "pickle.find_class", "webbrowser.")
-_LIBRARIES = tuple({str(Path(path).resolve()) for path in (sys.prefix, sys.base_prefix, PACKAGE)}) + ("/proc/", "/sys/")
+_LIBRARIES = (*(str(Path(path).resolve()) for path in (sys.prefix, sys.base_prefix, PACKAGE)), "/proc/", "/sys/")
 """Where code and its data lie: imports open files as well."""
 
 

@@ -18,8 +18,8 @@ _WHOLE = (0, 1, 2, 3, 7, 8, 63, 64, 65, 127, 128, 255, 256, 257, 4096, 32767, 32
 _TEXTS = (b"0", b"-1", b"1", b"1e308", b"-1e308", b"1e-320", b"nan", b"inf", b"1e400", b"2147483648", b"99999999999")
 _NAMES = ("", "x", "..", "../../etc/passwd", "/etc/passwd", "file:///etc/passwd", "http://127.0.0.1:9/x", "\0", "é" * 9,
           "\ud800", "a" * 300, "nan", "__class__", "data:;base64,AAAA")  # fmt: skip
-_VALUES: tuple[Any, ...] = (None, True, False, 0, -1, 1, 2, 0.5, 1e308, -1e308, 1e-320, float("nan"), float("inf"), 2**31, 2**63,
-                            2**64, 10**30, [], {}, [[]], [None], {"": 0}, [0, 1], [1, 0], [0.0, 1.0, 2.0])  # fmt: skip
+_VALUES: tuple[Any, ...] = (None, True, False, 0, -1, 1, 2, 0.5, 1e308, -1e308, 1e-320, float("nan"), float("inf"), 2**31,
+                            2**63, 2**64, 10**30, [], {}, [[]], [None], {"": 0}, [0, 1], [1, 0], [0.0, 1.0, 2.0])  # fmt: skip
 
 
 def of_bytes(data: bytes, random: Random) -> bytes:
@@ -152,8 +152,8 @@ def of_png(data: bytes, random: Random) -> bytes:
     kind, content = chunks[i]
     match random.randrange(6):
         case 0:
-            chunks.insert(random.randrange(len(chunks) + 1), (random.choice((b"acTL", b"fcTL", b"tRNS", b"PLTE", b"iCCP",
-                          b"zTXt", b"eXIf", b"gAMA", kind)), of_bytes(content[:64], random)))  # fmt: skip
+            chunks.insert(random.randrange(len(chunks) + 1), (random.choice((b"acTL", b"fcTL", b"tRNS", b"PLTE",
+                          b"iCCP", b"zTXt", b"eXIf", b"gAMA", kind)), of_bytes(content[:64], random)))  # fmt: skip
         case 1 if kind == b"IDAT":
             try:
                 chunks[i] = kind, zlib.compress(of_bytes(zlib.decompress(content), random))

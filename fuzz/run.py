@@ -80,7 +80,8 @@ def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("targets", nargs="*", default=TARGETS, metavar="TARGET", help=", ".join(TARGETS))
-    parser.add_argument("--minutes", type=float, default=1.0, help="for each target")
+    parser.add_argument("--minutes", type=float, default=1.0, help="for each target; or")
+    parser.add_argument("--seconds", type=float, help="for each target")
     parser.add_argument("--plain", action="store_true", help="without atheris: so many inputs, the same each time")
     parser.add_argument("--inputs", type=int, default=300, help="of a plain run, for each target")
     parser.add_argument("--seed", type=int, default=1)
@@ -90,7 +91,7 @@ def main() -> None:
         parser.error(f"no target {', '.join(sorted(unknown))}; the targets are {', '.join(TARGETS)}")
     found = 0
     for name in told.targets:
-        budget = told.inputs if told.plain else 60 * told.minutes
+        budget = told.inputs if told.plain else told.seconds or 60 * told.minutes
         row = fuzz(name, "plain" if told.plain else "atheris", budget, told.seed, told.findings)
         found += row["findings"]
         print(json.dumps(row), flush=True)

@@ -22,8 +22,8 @@ from safetensors.torch import save
 import sketchcore as sk
 from sketchcore import gltfcheck, meshfile, untrusted, volume
 from sketchcore.app.photo import read_photo
-from sketchcore.app.sessionfile import read_session, write_session
 from sketchcore.app.session import Session
+from sketchcore.app.sessionfile import read_session, write_session
 from sketchcore.datagen.prepared import Prepared, load_found, load_object
 from sketchcore.meshfile import load_mesh
 from sketchcore.nets import weights
@@ -116,8 +116,18 @@ def test_a_gltf_may_name_files_beside_it(scene: Callable[[dict[str, Any]], Path]
 
 
 @pytest.mark.parametrize(
-    "uri", ["../part.bin", "link.bin", "inner/../part.bin", "/etc/passwd", "file:///etc/passwd", "http://127.0.0.1:9/x", "..",
-            "", "inner"]  # fmt: skip
+    "uri",
+    [
+        "../part.bin",
+        "link.bin",
+        "inner/../part.bin",
+        "/etc/passwd",
+        "file:///etc/passwd",
+        "http://127.0.0.1:9/x",
+        "..",
+        "",
+        "inner",
+    ],
 )
 def test_a_gltf_may_name_no_others(scene: Callable[[dict[str, Any]], Path], uri: str) -> None:
     with pytest.raises(ValueError, match="which is no file in its folder"):
@@ -192,7 +202,7 @@ def test_mesh_files_have_a_largest_size(suffix: str, tmp_path: Path, monkeypatch
 def test_vertices_of_two_numbers_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "flat.obj"
     path.write_text("v 0 0\nv 1 0\nv 1 1\nf 1 2 3\n")
-    with pytest.raises(ValueError, match="cannot be read as .obj"):
+    with pytest.raises(ValueError, match=r"cannot be read as \.obj"):
         load_mesh(path)
 
 
@@ -396,7 +406,9 @@ def test_a_zip_bomb_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         sk.load(path)
 
 
-@pytest.mark.parametrize("array", [np.arange(6).reshape(2, 3), np.asfortranarray(np.eye(3)), np.empty((0, 4)), np.array("abc")])
+@pytest.mark.parametrize(
+    "array", [np.arange(6).reshape(2, 3), np.asfortranarray(np.eye(3)), np.empty((0, 4)), np.array("abc")]
+)
 def test_arrays_come_back_as_numpy_wrote_them(array: NDArray[Any]) -> None:
     back = untrusted.parse_array(_npy(array), "it")
     np.testing.assert_array_equal(back, array)
@@ -419,16 +431,19 @@ def test_a_session_file_that_points_before_its_beginning_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["../box.safetensors", "/etc/passwd", "..", "", None, 3, "a" * 300 + ".safetensors", "box.npz", "a\\b.safetensors"]
+    "name",
+    ["../box.safetensors", "/etc/passwd", "..", "", None, 3, "a" * 300 + ".safetensors", "box.npz", "a\\b.safetensors"],
 )
 def test_an_index_names_files_in_its_folder_alone(name: object, tmp_path: Path) -> None:
     entry = {"file": name, "split": "train", "sha256": "ab"}
     (tmp_path / "dataset.json").write_text(json.dumps({"format": 1, "objects": [entry]}))
-    with pytest.raises(ValueError, match="plain name that ends in .safetensors"):
+    with pytest.raises(ValueError, match=r"plain name that ends in \.safetensors"):
         Prepared(tmp_path)
 
 
-@pytest.mark.parametrize("index", ["[]", "3", "{", "[" * 100_000, '{"format": 1, "objects": 3}', '{"format": 1, "objects": [3]}'])
+@pytest.mark.parametrize(
+    "index", ["[]", "3", "{", "[" * 100_000, '{"format": 1, "objects": 3}', '{"format": 1, "objects": [3]}']
+)
 def test_an_index_that_is_none_is_refused(index: str, tmp_path: Path) -> None:
     (tmp_path / "dataset.json").write_text(index)
     with pytest.raises(ValueError, match="is no data set of sketchcore prepare"):

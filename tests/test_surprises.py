@@ -1,4 +1,4 @@
-"""Nothing is fetched from a network, nothing is unpickled, servers stay on this machine, and samples stay what they are."""
+"""Nothing is fetched or unpickled, servers stay on this machine, and samples stay what they are."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ from pathlib import Path
 from sketchcore.train import Run, train
 tiny = {"stem": 8, "image": (16, 16, 16), "features": 8, "fused": 8, "world": (8, 16, 16), "groups": 2}
 for steps in (1, 2):
-    train(Run(Path(folder) / "run", options=tiny, changes={"batch": 2}, steps=steps, resume=steps == 2), quiet=True)
+    train(Run(Path(folder) / "run", options=tiny, changes={"batch": 2}, steps=steps), resume=steps == 2, quiet=True)
 """,
 }
 
@@ -92,7 +92,9 @@ except PermissionError:
 
 
 def test_no_code_of_the_package_unpickles() -> None:
-    wrong = re.compile(r"\bimport (pickle|dill|cloudpickle|joblib|shelve|marshal)\b|torch\.load\b|allow_pickle=True|(?<![.\w])eval\(")
+    wrong = re.compile(
+        r"\bimport (pickle|dill|cloudpickle|joblib|shelve|marshal)\b|torch\.load\b|allow_pickle=True|(?<![.\w])eval\("
+    )
     found = [
         f"{path.name}:{number}"
         for path in PACKAGE.rglob("*.py")

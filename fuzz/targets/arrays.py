@@ -8,16 +8,33 @@ from typing import Any
 import numpy as np
 import skimage.measure
 import trimesh
-from harness import Source, Target
-from mutations import of_bytes
 from numpy.typing import NDArray
 
 import sketchcore as sk
+from harness import Source, Target
+from mutations import of_bytes
 from sketchcore.drawing import composition
 from sketchcore.mesh import extract_mesh
 
 _LOADED = skimage.measure
-_SPECIAL = (0.0, -0.0, 1.0, -1.0, 0.5, 1e-308, 5e-324, 1e-150, 1e-20, 1e20, 1e150, 1e308, -1e308, np.nan, np.inf, -np.inf)
+_SPECIAL = (
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    0.5,
+    1e-308,
+    5e-324,
+    1e-150,
+    1e-20,
+    1e20,
+    1e150,
+    1e308,
+    -1e308,
+    np.nan,
+    np.inf,
+    -np.inf,
+)
 _KINDS = ("u1", "?", "i1", "<u2", ">u2", "<i4", "<i8", "<u8", "<f2", "<f4", ">f4", "<f8", "<c8", "S3", "O")
 
 
@@ -81,8 +98,8 @@ def _shape(source: Source) -> sk.Shape:
 
 def _any(source: Source) -> NDArray[Any]:
     """An array of any dtype and a shape that fits somewhere, or nowhere."""
-    shape = source.choice(((64,) * 3, (1, 64, 64, 64), (256, 256), (2, 256, 256), (32,) * 3, (5, 7), (40, 30, 3), (8, 9, 4), (),
-                           (0,), (0, 64, 64, 64), (64, 64), (1, 1), (3, 3, 3), (128, 128, 128)))  # fmt: skip
+    shape = source.choice(((64,) * 3, (1, 64, 64, 64), (256, 256), (2, 256, 256), (32,) * 3, (5, 7), (40, 30, 3), (8, 9, 4),
+                           (), (0,), (0, 64, 64, 64), (64, 64), (1, 1), (3, 3, 3), (128, 128, 128)))  # fmt: skip
     dtype = np.dtype(source.choice(_KINDS))
     count = int(np.prod(shape))
     scale = source.choice((1, 1, 255, 1e9))

@@ -6,10 +6,10 @@ import json
 from random import Random
 
 import numpy as np
-from harness import Target
-from mutations import dump, of_json_text
 
 import sketchcore as sk
+from harness import Target
+from mutations import dump, of_json_text
 from sketchcore.camera import VIEWPOINTS
 from sketchcore.datagen.generate import default_config
 
@@ -52,7 +52,9 @@ def seeds() -> list[bytes]:
     seeds = [b"s" + shape.to_json().encode()]
     seeds += [b"l" + style.to_json().encode() for style in sk.STYLES.values()]
     seeds += [b"g" + dump(default_config()), b"r" + dump(default_config())]
-    seeds += [kind + dump({"grammar": default_config(name)["grammar"]}) for kind, name in ((b"c", "chair"), (b"v", "vase"))]
+    seeds += [
+        kind + dump({"grammar": default_config(name)["grammar"]}) for kind, name in ((b"c", "chair"), (b"v", "vase"))
+    ]
     return [*seeds, b"g{}", b"c{}", b"g" + dump(default_config("chair"))]
 
 

@@ -8,9 +8,9 @@ from random import Random
 
 import numpy as np
 import trimesh
+
 from harness import SCRATCH, Target
 from mutations import dump, of_bytes, of_json, of_safetensors
-
 from sketchcore.datagen.cleaning import place
 from sketchcore.datagen.prepared import MeshObject, Prepared, load_found, save_object
 

@@ -9,10 +9,10 @@ import numpy as np
 import skimage.filters
 import skimage.measure
 import skimage.morphology
-from harness import SCRATCH, Target
-from mutations import of_bytes, of_png
 from PIL import Image, ImageDraw
 
+from harness import SCRATCH, Target
+from mutations import of_bytes, of_png
 from sketchcore.app.photo import read_photo
 from sketchcore.drawing import load_drawing
 
@@ -50,12 +50,16 @@ def seeds() -> list[bytes]:
     """Every format that is let in, in the modes and with the compressions that it has."""
     grey = _picture()
     modes = {mode: grey.convert(mode) for mode in ("1", "L", "LA", "P", "RGB", "RGBA", "CMYK", "YCbCr", "I", "F")}
-    modes["I;16"] = Image.fromarray((np.asarray(grey).astype(np.uint16) * 257))
+    modes["I;16"] = Image.fromarray(np.asarray(grey).astype(np.uint16) * 257)
     exif = Image.Exif()
     exif[0x0112] = 6
     frames = [grey.rotate(turn, fillcolor=0).convert("P") for turn in (0, 30, 60)]
     files = [_file(modes[m], "PNG", exif=exif) for m in ("1", "L", "LA", "P", "RGB", "RGBA", "I;16")]
-    files += [_file(_picture((1, 1)), "PNG"), _file(_picture((9000, 2), ink=0), "PNG"), _file(_picture((80, 60), ink=0), "PNG")]
+    files += [
+        _file(_picture((1, 1)), "PNG"),
+        _file(_picture((9000, 2), ink=0), "PNG"),
+        _file(_picture((80, 60), ink=0), "PNG"),
+    ]
     files.append(_file(frames[0], "PNG", save_all=True, append_images=frames[1:]))
     files += [_file(modes[m], "JPEG", exif=exif) for m in ("L", "RGB", "CMYK")]
     files.append(_file(grey, "JPEG", progressive=True, quality=30))

@@ -14,9 +14,9 @@ import numpy as np
 import skimage.filters
 import skimage.measure
 from fastapi import FastAPI
+
 from harness import SCRATCH, Target
 from mutations import dump, of_bytes, of_json
-
 from sketchcore.app.guard import Guard
 from sketchcore.app.server import Server, build_router
 from sketchcore.app.store import Store
@@ -93,7 +93,9 @@ async def _ask(one: dict[str, Any], id: str) -> tuple[int, bytes]:
         "path": unquote(raw.decode(), errors="replace"),
         "raw_path": raw,
         "query_string": query.encode("utf-8", "replace"),
-        "headers": [(str(k).lower().encode("latin-1", "replace"), str(v).encode("latin-1", "replace")) for k, v in lines.items()],
+        "headers": [
+            (str(k).lower().encode("latin-1", "replace"), str(v).encode("latin-1", "replace")) for k, v in lines.items()
+        ],
         "client": ("127.0.0.1", 1),
         "server": ("127.0.0.1", 80),
     }
@@ -117,11 +119,15 @@ def seeds() -> list[bytes]:
     """What pages ask for, and what they do."""
     line = {"id": "a1", "kind": "ink", "points": [[60, 60, 0.5], [200, 180, 0.7], [60, 180, 0.2]]}
     post = {"method": "POST"}
-    strokes = post | {"path": "/api/s/{id}/strokes", "body": {"viewpoint": "quarter-037", "strokes": [line], "op": "x1"}}
+    strokes = post | {
+        "path": "/api/s/{id}/strokes",
+        "body": {"viewpoint": "quarter-037", "strokes": [line], "op": "x1"},
+    }
     get = [{"method": "GET", "path": f"/api/{path}"} for path in (
         "sessions", "s/{id}", "s/{id}/volume/solid", "s/{id}/volume/scene", "s/{id}/volume/unsure", "s/{id}/events",
         "s/{id}/export.glb", "s/{id}/export.obj", "s/{id}/file", "s/{id}/advice", "s/{id}/hints/quarter-037",
-        "s/{id}/reference/front", "examples/tour", "s/00000000000000000000000000000000", "s/..%2f..%2fetc", "../../etc")]  # fmt: skip
+        "s/{id}/reference/front", "examples/tour", "s/00000000000000000000000000000000", "s/..%2f..%2fetc",
+        "../../etc")]  # fmt: skip
     changes = {
         "erase": {"viewpoint": "quarter-037", "path": [[60, 60], [90, 90]], "radius": 8},
         "clear": {"viewpoint": "quarter-037"},
@@ -138,7 +144,11 @@ def seeds() -> list[bytes]:
     }
     do = {name: post | {"path": f"/api/s/{{id}}/{name}", "body": body} for name, body in changes.items()}
     picture = "P5 64 64 255\n" + ("\xff" * 31 + "\x00\x00" + "\xff" * 31) * 64
-    photo = post | {"path": "/api/s/{id}/photo?viewpoint=quarter-052", "headers": {"content-type": "image/png"}, "body": picture}
+    photo = post | {
+        "path": "/api/s/{id}/photo?viewpoint=quarter-052",
+        "headers": {"content-type": "image/png"},
+        "body": picture,
+    }
     file = post | {"path": "/api/sessions/import", "body": "PK\x05\x06" + "\0" * 18}
     journeys = [[strokes, *get], [strokes, *do.values()], [strokes, do["reconstruct"], do["freeze"], get[3], get[6]]]
     journeys += [[photo, get[1]], [file], [post | {"path": "/api/sessions"}], [post | {"path": "/api/examples/table"}]]

@@ -9,10 +9,10 @@ from random import Random
 import numpy as np
 import trimesh
 import trimesh.exchange.load
-from harness import SCRATCH, Target
-from mutations import dump, of_bytes, of_json
 
 import sketchcore as sk
+from harness import SCRATCH, Target
+from mutations import dump, of_bytes, of_json
 from sketchcore.datagen import cleaning
 from sketchcore.meshfile import READ_SUFFIXES, load_mesh
 

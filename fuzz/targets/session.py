@@ -5,9 +5,9 @@ from __future__ import annotations
 from random import Random
 
 import numpy as np
+
 from harness import Target
 from mutations import of_bytes, of_json_text, of_zip
-
 from sketchcore.app.document import Placement
 from sketchcore.app.history import History
 from sketchcore.app.ink import Stroke

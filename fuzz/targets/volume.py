@@ -6,10 +6,10 @@ import io
 from random import Random
 
 import numpy as np
-from harness import SCRATCH, Target
-from mutations import of_bytes, of_zip
 
 import sketchcore as sk
+from harness import SCRATCH, Target
+from mutations import of_bytes, of_zip
 from sketchcore.camera import VIEWPOINTS
 from sketchcore.reconstruction import Reconstruction
 from sketchcore.volume import save_npz

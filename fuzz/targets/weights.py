@@ -7,11 +7,11 @@ import pickle
 from random import Random
 
 import torch
-from harness import SCRATCH, Target
-from mutations import dump, of_bytes, of_json, of_safetensors
 from safetensors.torch import save
 
 import sketchcore as sk
+from harness import SCRATCH, Target
+from mutations import dump, of_bytes, of_json, of_safetensors
 from sketchcore.nets.compact import CompactConfig, CompactNet
 from sketchcore.nets.multiscale import MultiscaleNet
 from sketchcore.nets.sketches import Sketches
@@ -51,9 +51,14 @@ def seeds() -> list[bytes]:
         ({"network": "paper", "options": {"width": 1}}, {f"single.{k}": v for k, v in paper.state_dict().items()}),
         ({"network": "multiscale", "options": multiscale.describe()}, multiscale.state_dict()),
     ]
-    inputs = [_input(b"w", dump(c), save({k: v.half() if v.is_floating_point() else v for k, v in s.items()})) for c, s in nets]
+    inputs = [
+        _input(b"w", dump(c), save({k: v.half() if v.is_floating_point() else v for k, v in s.items()}))
+        for c, s in nets
+    ]
     told = {
-        "progress": json.dumps({"stage": "one", "step": 3, "samples": 5, "seconds": 1.5, "began": {"network": "compact"}}),
+        "progress": json.dumps(
+            {"stage": "one", "step": 3, "samples": 5, "seconds": 1.5, "began": {"network": "compact"}}
+        ),
         "task": json.dumps({"seed": "0"}),
     }
     checkpoint = {"model.a": torch.ones(2), "average.a": torch.ones(2), "optimizer.0.1.exp_avg": torch.ones(2)}

@@ -33,7 +33,7 @@ def check_gltf(content: bytes, binary: bool, most_bytes: int, most_triangles: in
         raise ValueError("its JSON is no object")
     views, accessors, meshes, nodes = (_rows(tree, name) for name in ("bufferViews", "accessors", "meshes", "nodes"))
     counts = [_count(accessor, "count") for accessor in accessors]
-    sizes = [_BYTES.get(a.get("componentType"), 4) * _NUMBERS.get(a.get("type"), 16) for a in accessors]
+    sizes = [_BYTES.get(a.get("componentType", 0), 4) * _NUMBERS.get(a.get("type", ""), 16) for a in accessors]
     wanted = sum(count * size for count, size in zip(counts, sizes, strict=True))
     if max(wanted, sum(_count(view, "byteLength") for view in views)) > most_bytes:
         raise ValueError(f"its numbers would take more than {most_bytes // 2**20} MiB")
@@ -79,7 +79,6 @@ def _count(row: Tree, name: str) -> int:
 
 def _triangles(primitive: Tree, counts: list[int]) -> int:
     """At most: a strip has nearly as many as it has corners."""
-    corners = [counts[number] for number in primitive["attributes"].values()]
-    return max([*corners, counts[primitive["indices"]] if "indices" in primitive else 0]) // (
-        1 if primitive.get("mode", 4) == 5 else 3
-    )
+    named = [*primitive["attributes"].values(), *([primitive["indices"]] if "indices" in primitive else [])]
+    most = max((counts[number] for number in named), default=0)
+    return most if primitive.get("mode", 4) == 5 else most // 3

@@ -56,12 +56,14 @@ fn finite() -> impl Strategy<Value = f64> {
 fn mesh() -> impl Strategy<Value = (Vec<[f64; 3]>, Vec<[i64; 3]>)> {
     let vertices =
         prop_oneof![vec(prop::array::uniform3(finite()), 1..12), vec(prop::array::uniform3(number()), 0..12)];
-    (vertices, vec(prop::array::uniform3(any::<i64>()), 0..20), 0..10u8).prop_map(|(vertices, faces, wild)| {
-        let count = vertices.len().max(1) as i64;
-        let kept = faces.into_iter().map(|f| if wild == 0 { f } else { f.map(|i| i.rem_euclid(count)) });
-        let kept = kept.collect();
-        (vertices, kept)
-    })
+    (vertices, vec(prop::array::uniform3(any::<i64>()), 0..20), 0..10u8).prop_map(
+        |(vertices, faces, wild)| {
+            let count = vertices.len().max(1) as i64;
+            let kept = faces.into_iter().map(|f| if wild == 0 { f } else { f.map(|i| i.rem_euclid(count)) });
+            let kept = kept.collect();
+            (vertices, kept)
+        },
+    )
 }
 
 fn rows<const N: usize>() -> impl Strategy<Value = Vec<[f64; N]>> {
@@ -100,7 +102,15 @@ fn check(seen: &Buffers) {
     assert!(seen.normal.as_flattened().iter().all(|n| !n.is_nan()), "NaN in a normal");
 }
 
+/// As many cases as `PROPTEST_CASES` says, or a share of them; findings become tests of their own, and no files.
+fn cases(share: u32) -> ProptestConfig {
+    let all = ProptestConfig { failure_persistence: None, ..ProptestConfig::default() };
+    ProptestConfig { cases: all.cases / share + 1, ..all }
+}
+
 proptest! {
+    #![proptest_config(cases(1))]
+
     #[test]
     fn any_camera_is_one_or_refused(row in prop::array::uniform15(number())) {
         if let Ok(camera) = Camera::from_packed(&row) {
@@ -158,7 +168,7 @@ proptest! {
 
 proptest! {
     // What draws whole pictures, or reads whole grids, takes a while in this profile.
-    #![proptest_config(ProptestConfig::with_cases(ProptestConfig::default().cases / 8 + 1))]
+    #![proptest_config(cases(8))]
 
     #[test]
     fn any_mesh_is_drawn_or_refused((vertices, faces) in mesh(), camera in camera()) {

@@ -25,7 +25,6 @@ from sketchcore.nets.lift import COARSE, lift
 from sketchcore.nets.precision import unit
 from sketchcore.nets.sketches import Sketches
 
-
 MAX_WIDTH = 4096
 """Channels of any layer."""
 

@@ -214,7 +214,9 @@ def _made(make: Callable[[], Net], state: dict[str, Tensor], kind: str) -> Net:
         with torch.device("meta"), _Unfilled():
             expected = make().state_dict()
     except (TypeError, ValueError, RuntimeError, ArithmeticError) as error:
-        raise ValueError(f"the config is wrong, or of another version of the network {kind!r}: {reason(error)}") from error
+        raise ValueError(
+            f"the config is wrong, or of another version of the network {kind!r}: {reason(error)}"
+        ) from error
     for name, like in expected.items():
         given = state.get(name)
         if given is None:

@@ -28,7 +28,16 @@ MAX_HEADER = 2**24
 """Bytes of its header, which says what tensors there are."""
 MAX_CONFIG = 2**20
 """Bytes of the config."""
-_STORED = (torch.float16, torch.bfloat16, torch.float32, torch.float64, torch.int64, torch.int32, torch.uint8, torch.bool)
+_STORED = (
+    torch.float16,
+    torch.bfloat16,
+    torch.float32,
+    torch.float64,
+    torch.int64,
+    torch.int32,
+    torch.uint8,
+    torch.bool,
+)
 
 
 def save_weights(
