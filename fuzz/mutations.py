@@ -16,10 +16,41 @@ from typing import Any
 _WHOLE = (0, 1, 2, 3, 7, 8, 63, 64, 65, 127, 128, 255, 256, 257, 4096, 32767, 32768, 65535, 65536, 2**31 - 1, 2**31,
           2**32 - 1, 2**32, 2**53, 2**63 - 1, 2**63, 2**64 - 1)  # fmt: skip
 _TEXTS = (b"0", b"-1", b"1", b"1e308", b"-1e308", b"1e-320", b"nan", b"inf", b"1e400", b"2147483648", b"99999999999")
-_NAMES = ("", "x", "..", "../../etc/passwd", "/etc/passwd", "file:///etc/passwd", "http://127.0.0.1:9/x", "\0", "é" * 9,
-          "\ud800", "a" * 300, "nan", "__class__", "data:;base64,AAAA")  # fmt: skip
-_VALUES: tuple[Any, ...] = (None, True, False, 0, -1, 1, 2, 0.5, 1e308, -1e308, 1e-320, float("nan"), float("inf"), 2**31,
-                            2**63, 2**64, 10**30, [], {}, [[]], [None], {"": 0}, [0, 1], [1, 0], [0.0, 1.0, 2.0])  # fmt: skip
+_NAMES = (
+    *(
+        "",
+        "x",
+        "..",
+        "../../etc/passwd",
+        "/etc/passwd",
+        "file:///etc/passwd",
+        "http://127.0.0.1:9/x",
+        "data:;base64,AAAA",
+    ),
+    *("\0", "é" * 9, "\ud800", "a" * 300, "nan", "__class__"),
+)
+_VALUES: tuple[Any, ...] = (
+    *(
+        None,
+        True,
+        False,
+        0,
+        -1,
+        1,
+        2,
+        0.5,
+        1e308,
+        -1e308,
+        1e-320,
+        float("nan"),
+        float("inf"),
+        2**31,
+        2**63,
+        2**64,
+        10**30,
+    ),
+    *([], {}, [[]], [None], {"": 0}, [0, 1], [1, 0], [0.0, 1.0, 2.0]),
+)
 
 
 def of_bytes(data: bytes, random: Random) -> bytes:

@@ -35,6 +35,10 @@ _SPECIAL = (
     np.inf,
     -np.inf,
 )
+_SHAPES = (
+    *((64,) * 3, (1, 64, 64, 64), (256, 256), (2, 256, 256), (32,) * 3, (5, 7), (40, 30, 3), (8, 9, 4)),
+    *((), (0,), (0, 64, 64, 64), (64, 64), (1, 1), (3, 3, 3), (128, 128, 128)),
+)
 _KINDS = ("u1", "?", "i1", "<u2", ">u2", "<i4", "<i8", "<u8", "<f2", "<f4", ">f4", "<f8", "<c8", "S3", "O")
 
 
@@ -98,8 +102,7 @@ def _shape(source: Source) -> sk.Shape:
 
 def _any(source: Source) -> NDArray[Any]:
     """An array of any dtype and a shape that fits somewhere, or nowhere."""
-    shape = source.choice(((64,) * 3, (1, 64, 64, 64), (256, 256), (2, 256, 256), (32,) * 3, (5, 7), (40, 30, 3), (8, 9, 4),
-                           (), (0,), (0, 64, 64, 64), (64, 64), (1, 1), (3, 3, 3), (128, 128, 128)))  # fmt: skip
+    shape = source.choice(_SHAPES)
     dtype = np.dtype(source.choice(_KINDS))
     count = int(np.prod(shape))
     scale = source.choice((1, 1, 255, 1e9))

@@ -45,9 +45,9 @@ def load_mesh(path: str | os.PathLike[str]) -> trimesh.Trimesh:
         if suffix in (".glb", ".gltf"):
             check_gltf(content, suffix == ".glb", MAX_BYTES, MAX_TRIANGLES)
         # Of an open file, nothing but what the resolver gives is read beside it.
-        scene = trimesh.load_scene(
-            io.BytesIO(content), suffix[1:], resolver=_Beside(file), process=False, skip_materials=True
-        )
+        beside: Any = _Beside(file)
+        opened = io.BytesIO(content)
+        scene = trimesh.load_scene(opened, suffix[1:], resolver=beside, process=False, skip_materials=True)
         meshes = {name: part for name, part in scene.geometry.items() if isinstance(part, trimesh.Trimesh)}
         placed = [name for name in (scene.graph[node][1] for node in scene.graph.nodes_geometry) if name in meshes]
         triangles = sum(len(meshes[name].faces) for name in placed)
@@ -55,8 +55,8 @@ def load_mesh(path: str | os.PathLike[str]) -> trimesh.Trimesh:
             raise ValueError(f"a mesh may have up to {MAX_TRIANGLES} triangles, this one has {triangles}")
         parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh) and len(part.faces)]
         if parts:
-            mesh: Any = parts[0] if len(parts) == 1 else trimesh.util.concatenate(parts)
-            mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False, validate=False)
+            whole: Any = parts[0] if len(parts) == 1 else trimesh.util.concatenate(parts)
+            mesh = trimesh.Trimesh(whole.vertices, whole.faces, process=False, validate=False)
             if mesh.vertices.shape[1:] != (3,) or mesh.faces.shape[1:] != (3,):
                 raise ValueError(f"its vertices are {mesh.vertices.shape}, its faces {mesh.faces.shape}, not [n, 3]")
             return mesh

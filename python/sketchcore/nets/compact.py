@@ -54,10 +54,10 @@ class CompactConfig:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value, default = getattr(self, field.name), field.default
-            each = value if isinstance(default, tuple) and isinstance(value, tuple) else (value,)
-            if len(each) != (len(default) if isinstance(default, tuple) else 1):
-                raise ValueError(f"{field.name} must be {len(default)} widths, got {value!r:.80}")
+            value, several = getattr(self, field.name), isinstance(field.default, tuple)
+            each = value if several and isinstance(value, tuple) else (value,)
+            if several and len(each) != 3:
+                raise ValueError(f"{field.name} must be 3 widths, got {value!r:.80}")
             if not all(type(width) is int and 1 <= width <= MAX_WIDTH for width in each):
                 raise ValueError(f"{field.name} must be whole, 1 to {MAX_WIDTH}, got {value!r:.80}")
 
