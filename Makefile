@@ -10,7 +10,7 @@ CARGO_TARGET_DIR ?= target
 export CARGO_TARGET_DIR
 export PIP_QUIET := 1
 
-.PHONY: all format build lint test test-rust test-python demo bench docs wheel clean
+.PHONY: all format build lint test test-rust test-python fuzz audit demo bench docs wheel clean
 
 all: format build lint test
 
@@ -51,6 +51,18 @@ test-python: $(BUILT)
 	@command -v chromium >/dev/null || [ "$$(id -u)" != 0 ] || { apt-get update -qq; \
 		DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends chromium; } >/dev/null || true
 	$(BIN)/pytest --quiet
+
+# A minute of each target, or FUZZ_SECONDS; what is found is kept in fuzz/findings. TARGETS="mesh http" takes some.
+FUZZ_SECONDS ?= 60
+fuzz: $(BUILT)
+	$(BIN)/pip install --quiet --group fuzz
+	$(BIN)/python fuzz/run.py --seconds $(FUZZ_SECONDS) $(TARGETS)
+
+# What is known against the libraries that are used: asks databases in the network, which nothing else here does.
+audit: $(READY)
+	$(BIN)/pip install --quiet --group audit
+	$(BIN)/pip-audit --local --skip-editable
+	cargo audit
 
 demo: $(BUILT)
 	$(BIN)/python examples/demo.py

@@ -60,8 +60,9 @@ class Camera:
         numbers = np.concatenate([position, rotation.ravel(), [self.fov_degrees, self.near, self.far]])
         if not np.isfinite(numbers).all():
             raise ValueError("camera has a NaN or infinite number; every entry must be finite")
-        # Cameras stored with six decimals are still rotations: hence the tolerance.
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-4 or np.linalg.det(rotation) < 0:
+        # Cameras stored with six decimals are still rotations: hence the tolerance. Larger numbers might overflow.
+        turns = np.abs(rotation).max() < 2 and np.abs(rotation @ rotation.T - np.eye(3)).max() <= 1e-4
+        if not turns or np.linalg.det(rotation) < 0:
             raise ValueError("camera rotation must be orthonormal with determinant +1 (rows: right, down, forward)")
         if not 0 < self.fov_degrees < 180:
             raise ValueError(f"camera fov_degrees must lie between 0 and 180, got {self.fov_degrees}")

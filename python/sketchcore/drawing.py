@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import os
-import struct
 import warnings
 from dataclasses import dataclass
 
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageOps
 
 from sketchcore.grids import IMAGE, as_drawings
+from sketchcore.untrusted import reason
 
 # scikit-image is imported by what needs it: half a second, and clean drawings do without.
 
@@ -132,8 +132,10 @@ def _grey(source: object) -> Grey:
             raise ValueError(f"{name} is a folder, not an image") from error
         except Image.DecompressionBombError as error:
             raise ValueError(f"{name}: {_TOO_LARGE}") from error
-        except (OSError, SyntaxError, ValueError, struct.error) as error:
-            raise ValueError(f"{name} is no image of a known kind ({', '.join(FORMATS)}): {error}") from error
+        except MemoryError:
+            raise
+        except Exception as error:  # readers raise whatever their parsing stumbled over
+            raise ValueError(f"{name} is no image of a known kind ({', '.join(FORMATS)}): {reason(error)}") from error
     with image:
         return _decoded(image, name)
 
@@ -149,8 +151,10 @@ def _decoded(image: Image.Image, name: str) -> Grey:
         if image.has_transparency_data:
             return _flattened(image.convert("RGBA"))
         return _flattened(image if image.mode == "L" else image.convert("RGB").convert("L"))
-    except (OSError, SyntaxError, ValueError, struct.error) as error:
-        raise ValueError(f"{name} cannot be read as an image: {error}") from error
+    except MemoryError:
+        raise
+    except Exception as error:
+        raise ValueError(f"{name} cannot be read as an image: {reason(error)}") from error
 
 
 def _from_array(array: NDArray[np.generic]) -> Image.Image:

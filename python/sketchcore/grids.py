@@ -197,7 +197,8 @@ def _as_volumes(volume: NDArray[np.floating], name: str) -> NDArray[np.float32]:
     if array.ndim not in (3, 4) or array.shape[-3:] not in [(side,) * 3 for side in SIDES]:
         expected = f"[s, s, s] or [n, s, s, s], s one of {list(SIDES)}"
         raise ValueError(f"{name} must have shape {expected}, got {list(array.shape)}")
-    return np.ascontiguousarray(array, np.float32).reshape(-1, *array.shape[-3:])
+    with np.errstate(over="ignore"):  # what is too large for float32 is infinite, and refused
+        return np.ascontiguousarray(array, np.float32).reshape(-1, *array.shape[-3:])
 
 
 def _as_cameras(camera: Camera | Sequence[Camera], batch: bool) -> NDArray[np.float64]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sketchcore import _core
 from sketchcore.camera import Camera
+from sketchcore.untrusted import parse_json
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class LineStyle:
             ValueError: for what is no JSON object, or has an unknown name, or a number out of range.
             TypeError: for what is no number.
         """
-        numbers = json.loads(text)
+        numbers = parse_json(text, "a line style")
         if not isinstance(numbers, dict):
             raise ValueError(f"a line style is a JSON object, got {type(numbers).__name__}")
         for name in numbers:

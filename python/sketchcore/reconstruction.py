@@ -135,11 +135,13 @@ def load(path: str | os.PathLike[str]) -> Reconstruction:
     probability = _checked_side(arrays["probability"], path)
     if not {"cameras", "drawings", "trace"} <= arrays.keys():
         return Reconstruction(probability)
-    views = tuple(Camera.from_packed(row) for row in arrays["cameras"])
-    drawings = arrays["drawings"]
+    rows, trace, drawings = arrays["cameras"], arrays["trace"], arrays["drawings"]
+    if rows.dtype != np.float64 or rows.ndim != 2 or trace.dtype != np.float64 or trace.ndim != 1:
+        raise ValueError(f"{path}: its cameras must be float64 [n, 15], and its trace float64 [rounds]")
+    views = tuple(Camera.from_packed(row) for row in rows)
     if drawings.dtype != np.uint8 or drawings.shape != (len(views), 256, 256):
         raise ValueError(f"{path}: its drawings must be uint8 [{len(views)}, 256, 256], one a camera")
-    return Reconstruction(probability, views, tuple(float(t) for t in arrays["trace"]), drawings)
+    return Reconstruction(probability, views, tuple(float(t) for t in trace), drawings)
 
 
 def _checked_side(volume: Volume, path: str | os.PathLike[str]) -> Volume:

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sketchcore.untrusted import parse_json
+
 if TYPE_CHECKING:
     import trimesh
 
@@ -290,7 +292,7 @@ class Shape:
         Raises:
             ValueError: if the text is no JSON, or a primitive lacks an entry or has a wrong one.
         """
-        data = json.loads(text) if isinstance(text, str) else text
+        data = parse_json(text, "a shape") if isinstance(text, str) else text
         if not isinstance(data, dict) or not isinstance(data.get("primitives"), list):
             raise ValueError('a shape in JSON is {"primitives": [...]}')
         return cls(_from_dict(item, index) for index, item in enumerate(data["primitives"]))

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sketchcore.atomic import replacing
+from sketchcore.untrusted import Archive, check_size, parse_array
 
 _PROBABILITY = "probability"
+MAX_UNPACKED = 2**28
+"""Bytes of all arrays of an `.npz` file together."""
+MAX_BINVOX = 2**28
+"""Bytes of a `.binvox` file."""
+_MAX_ARRAYS = 64
 
 
 def as_probability(volume: ArrayLike) -> NDArray[np.float32]:
@@ -81,16 +85,22 @@ def load_npz(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
 
     Raises:
         FileNotFoundError: if there is no such file.
-        ValueError: if the file is damaged, or holds no volume.
+        ValueError: if the file is damaged, holds no volume, or unpacks to more than 256 MiB.
     """
+    check_size(path, MAX_UNPACKED, "volume")
+    arrays: dict[str, NDArray[Any]] = {}
     try:
-        # numpy leaves a damaged file open if it opened it itself.
-        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
+        with Path(path).open("rb") as stream:
+            archive, left = Archive(stream, "an .npz file", _MAX_ARRAYS), MAX_UNPACKED
+            for entry in archive.names:
+                content = archive.read(entry, left)
+                left -= len(content)
+                name = entry.removesuffix(".npy")
+                arrays[name] = parse_array(content, f"its array {name[:40]!r}")
         if _PROBABILITY not in arrays:
-            raise ValueError(f"it must have an array 'probability', it has {', '.join(arrays) or 'none'}")
+            raise ValueError(f"it must have an array 'probability', it has {', '.join(arrays)[:80] or 'none'}")
         arrays[_PROBABILITY] = as_probability(arrays[_PROBABILITY])
-    except (zipfile.BadZipFile, zlib.error, EOFError, TypeError, ValueError) as error:
+    except ValueError as error:
         raise ValueError(f"{path} is no .npz file of a volume, or is damaged: {error}") from error
     return arrays
 
@@ -128,8 +138,9 @@ def load_binvox(path: str | os.PathLike[str]) -> NDArray[np.float32]:
 
     Raises:
         FileNotFoundError: if there is no such file.
-        ValueError: if the header is wrong, the grid no cube, or the runs do not fill it exactly.
+        ValueError: if the header is wrong, the grid no cube, or the runs do not fill it exactly; for more than 256 MiB.
     """
+    check_size(path, MAX_BINVOX, "volume")
     header, found, body = Path(path).read_bytes().partition(b"\ndata\n")
     lines = header.decode("ascii", "replace").split("\n")
     if not found or lines[0].split() not in (["#binvox", "1"], ["#binvox", "2"]):

@@ -93,7 +93,10 @@ pub fn bilateral(
     let moved = fit_vertices(&start, faces, &around, &normals);
     let kept = without_folds(&start, &moved, faces, &normals);
     for (vertex, position) in vertices.iter_mut().zip(kept) {
-        *vertex = position.to_array();
+        // Of coordinates as large as numbers can be, squares overflow.
+        if position.is_finite() {
+            *vertex = position.to_array();
+        }
     }
     Ok(())
 }

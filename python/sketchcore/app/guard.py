@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Awaitable, Callable, Iterable, MutableMapping
 from typing import Any
 from urllib.parse import urlsplit
@@ -20,6 +21,11 @@ LARGEST = 64 * 2**20
 
 class TooLargeError(ValueError):
     """A request's body is larger than it may be."""
+
+
+def body_length(header: str) -> float:
+    """What a request says of its body's length; infinite if that is no number."""
+    return int(header) if header.isascii() and header.isdecimal() and len(header) < 20 else math.inf
 
 
 class Guard:
@@ -59,14 +65,17 @@ class Guard:
 
     def _refusal(self, headers: dict[str, str]) -> tuple[int, str] | None:
         host = headers.get("host", "")
-        name = urlsplit(f"//{host}").hostname or ""
+        origin = headers.get("origin")
+        try:
+            name = urlsplit(f"//{host}").hostname or ""
+            foreign = origin is not None and urlsplit(origin).netloc != host
+        except ValueError:
+            return 400, "the host or the origin of this request is no name of a server"
         if self.hosts is not None and name not in self.hosts:
             return 403, f"this server is not called {name[:80]!r}; its names are {', '.join(sorted(self.hosts))}"
-        origin = headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc != host:
+        if foreign:
             return 403, "requests from the pages of another site are refused"
-        length = headers.get("content-length", "0")
-        if not length.isdigit() or int(length) > self.largest:
+        if body_length(headers.get("content-length", "0")) > self.largest:
             return 413, f"a request may have up to {self.largest // 2**20} MB"
         return None
 

@@ -12,7 +12,6 @@ follows the edge of a shadow or of the sheet; and what lies outside the sheet is
 from __future__ import annotations
 
 import io
-import struct
 import warnings
 
 import numpy as np
@@ -86,16 +85,18 @@ def _decoded(data: bytes) -> Image.Image:
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # refused below
             image = Image.open(io.BytesIO(data), formats=FORMATS)
         if image.width * image.height > MAX_PIXELS:
-            raise ValueError(f"a picture may have up to {MAX_PIXELS // 1_000_000} megapixels, this one has more")
+            raise Image.DecompressionBombError
         image.draft("L", (2 * _WORK, 2 * _WORK))  # JPEG: large ones are decoded smaller
         upright = ImageOps.exif_transpose(image)
+        if upright.mode in ("1", "P", "CMYK", "YCbCr") and not upright.has_transparency_data:
+            return upright.convert("RGB")
+        return upright
     except Image.DecompressionBombError as error:
         raise ValueError(f"a picture may have up to {MAX_PIXELS // 1_000_000} megapixels, this one has more") from error
-    except (OSError, SyntaxError, struct.error) as error:
+    except MemoryError:
+        raise
+    except Exception as error:  # readers raise whatever their parsing stumbled over
         raise ValueError(f"this is no picture of a known kind ({', '.join(FORMATS)}), or it is damaged") from error
-    if upright.mode in ("1", "P", "CMYK", "YCbCr") and not upright.has_transparency_data:
-        return upright.convert("RGB")
-    return upright
 
 
 def _is_uniform(image: Image.Image) -> bool:

@@ -31,7 +31,7 @@ from sketchcore.app import hints, photo
 from sketchcore.app.document import listed, placement_from_json, stroke_from_json, stroke_to_json
 from sketchcore.app.events import Hub, sent_state
 from sketchcore.app.examples import read_scene, read_tour
-from sketchcore.app.guard import TooLargeError
+from sketchcore.app.guard import TooLargeError, body_length
 from sketchcore.app.session import Session
 from sketchcore.app.sessionfile import MAX_FILE, SUFFIX
 from sketchcore.app.store import NotKeptError, Store
@@ -246,9 +246,8 @@ async def _body(request: Request, limit: int) -> bytes:
     Raises:
         TooLargeError: if it is larger than `limit` bytes.
     """
-    length = request.headers.get("content-length", "0")
     body = bytearray()
-    if not length.isdigit() or int(length) > limit:
+    if body_length(request.headers.get("content-length", "0")) > limit:
         raise TooLargeError(f"this may have up to {limit // 2**20} MB")
     async for chunk in request.stream():
         body += chunk

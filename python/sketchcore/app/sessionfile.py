@@ -11,7 +11,6 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-import zlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -24,6 +23,7 @@ from sketchcore.app.session import Kept, Session
 from sketchcore.app.solids import Solid, as_solid, key_of
 from sketchcore.camera import VIEWPOINTS
 from sketchcore.grids import SIDE
+from sketchcore.untrusted import Archive, parse_array, parse_json
 
 FORMAT = "sketchcore session"
 VERSION = 1
@@ -84,26 +84,6 @@ def _check_cameras(cameras: object) -> None:
             )
 
 
-def parse_json(text: bytes, what: str) -> Any:
-    """Plain data of JSON, without NaN and Infinity.
-
-    Raises:
-        ValueError: for what is no JSON, or nested without end.
-    """
-
-    def refuse(constant: str) -> None:
-        raise ValueError(f"{what} holds {constant}; every number must be finite")
-
-    try:
-        return json.loads(text, parse_constant=refuse)
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{what} is no text in UTF-8") from error
-    except json.JSONDecodeError as error:
-        raise ValueError(f"{what} is damaged: {error}") from error
-    except RecursionError as error:
-        raise ValueError(f"{what} is nested too deeply") from error
-
-
 def write_session(session: Session) -> bytes:
     """The session file: the drawings of all parts, the cameras, and the volumes; not what could be undone."""
     kept = session.kept()
@@ -126,34 +106,13 @@ def read_session(data: bytes) -> Session:
     """
     if len(data) > MAX_FILE:
         raise ValueError(f"a session file may have up to {MAX_FILE // 2**20} MB, this one has more")
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            if len(archive.infolist()) > _MAX_ENTRIES:
-                raise ValueError(f"a session file has up to {_MAX_ENTRIES} entries, this one more")
-            record = parse_json(_entry(archive, _DOCUMENT, MAX_DOCUMENT), "the session's document")
-            document, solid, made_of = recall(record)
-            keys = {part.volume for part in document.parts} | ({solid} if solid is not None else set())
-            volumes = {key: _volume(archive, key) for key in sorted(keys)}
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError) as error:
-        raise ValueError(f"this is no session file of sketchcore, or it is damaged: {error}") from error
+    archive = Archive(io.BytesIO(data), "a session file of sketchcore", _MAX_ENTRIES)
+    record = parse_json(archive.read(_DOCUMENT, MAX_DOCUMENT), "the session's document")
+    document, solid, made_of = recall(record)
+    keys = {part.volume for part in document.parts} | ({solid} if solid is not None else set())
+    names = {key: f"volumes/{check_id(key, 'a volume')}.npy" for key in sorted(keys)}
+    volumes = {key: parse_volume(archive.read(name, _VOLUME_BYTES), key) for key, name in names.items()}
     return Session(None, History(document), volumes, solid, made_of)
-
-
-def _entry(archive: zipfile.ZipFile, name: str, most: int) -> bytes:
-    try:
-        entry = archive.getinfo(name)
-    except KeyError:
-        raise ValueError(f"this is no session file of sketchcore, or it is damaged: it has no {name}") from None
-    # What the archive says of its size may be a lie; no more than that much is unpacked.
-    with archive.open(entry) as stream:
-        content = stream.read(most + 1)
-    if len(content) > most:
-        raise ValueError(f"{name} in the session file is larger than {most} bytes")
-    return content
-
-
-def _volume(archive: zipfile.ZipFile, key: str) -> Solid:
-    return parse_volume(_entry(archive, f"volumes/{check_id(key, 'a volume')}.npy", _VOLUME_BYTES), key)
 
 
 def parse_volume(content: bytes, key: str) -> Solid:
@@ -162,11 +121,8 @@ def parse_volume(content: bytes, key: str) -> Solid:
     Raises:
         ValueError: if it is damaged, or another one than its key says.
     """
-    try:
-        array = np.load(io.BytesIO(content), allow_pickle=False)
-    except (ValueError, EOFError, TypeError, SyntaxError, MemoryError, OverflowError) as error:
-        raise ValueError(f"the volume {key} is damaged: {error}") from error
-    if not isinstance(array, np.ndarray) or array.dtype != np.uint8 or array.shape != (SIDE,) * 3:
+    array = parse_array(content, f"the volume {key}")
+    if array.dtype != np.uint8 or array.shape != (SIDE,) * 3:
         raise ValueError(f"the volume {key} must be uint8 [64, 64, 64]")
     solid = as_solid(array)
     if key_of(solid) != key:

@@ -27,9 +27,10 @@ import numpy as np
 from sketchcore.app.document import Document
 from sketchcore.app.history import History
 from sketchcore.app.session import Session
-from sketchcore.app.sessionfile import describe, parse_json, parse_volume, read_session, recall, write_session
+from sketchcore.app.sessionfile import describe, parse_volume, read_session, recall, write_session
 from sketchcore.app.solids import Solid
 from sketchcore.atomic import sweep, write_atomically
+from sketchcore.untrusted import parse_json
 
 _log = logging.getLogger(__name__)
 _ID = re.compile(r"[0-9a-f]{32}")

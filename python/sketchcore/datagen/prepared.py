@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,18 +20,20 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from sketchcore import _core
 from sketchcore.atomic import write_atomically
 from sketchcore.datagen.generate import Batch
 from sketchcore.grids import CREASE_DEGREES
+from sketchcore.untrusted import check_size, parse_json, reason
 
 INDEX = "dataset.json"
 OBJECTS = "objects"
 SPLITS = ("train", "val", "test")
 VERSION = 2
+MAX_OBJECT = 2**30
+"""Bytes of an object's file."""
 
 
 @dataclass(frozen=True)
@@ -81,16 +84,23 @@ def load_object(path: Path) -> MeshObject:
 
     Raises:
         FileNotFoundError: if there is none.
-        ValueError: if the file is none, or damaged.
+        ValueError: if the file is none, damaged, or larger than 1 GiB.
     """
+    check_size(path, MAX_OBJECT, "object of a data set")
     try:
         arrays = load(path.read_bytes())
-        world = np.unpackbits(arrays["world"], axis=2, bitorder="little")
-        if world.shape != (64, 64, 64):
-            raise ValueError(f"its world is {list(world.shape)}")
-        return MeshObject(arrays["vertices"], arrays["faces"], world)
-    except (SafetensorError, KeyError, ValueError) as error:
-        raise ValueError(f"{path} is no object of a data set, or is damaged: {error}") from error
+        vertices, faces, packed = (arrays[name] for name in ("vertices", "faces", "world"))
+        if packed.dtype != np.uint8 or packed.shape != (64, 64, 8):
+            raise ValueError(f"its world must be uint8 [64, 64, 8], got {packed.dtype} {list(packed.shape)}")
+        if vertices.dtype != np.float32 or faces.dtype != np.int32:
+            raise ValueError(f"it must have float32 vertices and int32 faces, got {vertices.dtype} and {faces.dtype}")
+        if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,):
+            raise ValueError(f"its vertices and faces must be [n, 3], got {vertices.shape} and {faces.shape}")
+        return MeshObject(vertices, faces, np.unpackbits(packed, axis=2, bitorder="little"))
+    except MemoryError:
+        raise
+    except Exception as error:  # what dtypes and sizes numpy cannot have, it says in its own ways
+        raise ValueError(f"{path} is no object of a data set, or is damaged: {reason(error)}") from error
 
 
 def load_found(path: Path) -> dict[str, Any] | None:
@@ -98,11 +108,11 @@ def load_found(path: Path) -> dict[str, Any] | None:
     try:
         data = path.read_bytes()
         length = int.from_bytes(data[:8], "little")
-        found: dict[str, Any] = json.loads(json.loads(data[8 : 8 + length])["__metadata__"]["found"])
-        load(data)
-    except (OSError, SafetensorError, KeyError, ValueError):
+        told = parse_json(parse_json(data[8 : 8 + length], "the header")["__metadata__"]["found"], "what was found")
+        load_object(path)
+    except (OSError, KeyError, TypeError, ValueError):
         return None
-    return found
+    return dict(told) if isinstance(told, dict) else None
 
 
 class Prepared:
@@ -129,14 +139,14 @@ class Prepared:
         if not index.is_file():
             raise FileNotFoundError(f"no data set in {self.folder}: make one by sketchcore prepare MESHES -o DATASET")
         try:
-            data = json.loads(index.read_text())
+            data = parse_json(index.read_bytes(), "the index")
             if data["format"] != VERSION:
                 raise ValueError(f"its format is {data['format']}, this version reads {VERSION}")
             objects = {split: [item for item in data["objects"] if item["split"] == split] for split in SPLITS}
-            self._files = {split: [str(item["file"]) for item in items] for split, items in objects.items()}
+            self._files = {split: [_name(item["file"]) for item in items] for split, items in objects.items()}
             named = [(item["file"], item["split"], item["sha256"]) for item in data["objects"]]
         except (KeyError, TypeError, ValueError) as error:
-            raise ValueError(f"{index} is no data set of sketchcore prepare: {error}") from error
+            raise ValueError(f"{index} is no data set of sketchcore prepare: {reason(error)}") from error
         self.fingerprint = hashlib.sha256(json.dumps(sorted(named)).encode()).hexdigest()[:16]
 
     def __repr__(self) -> str:
@@ -216,6 +226,13 @@ class Prepared:
             if frusta:
                 cells[i] = item.frusta(cameras[i])
         return Batch(drawings, world, cells, cameras, ())
+
+
+def _name(file: object) -> str:
+    """The name of a file beside others: the index may come from anywhere."""
+    if not isinstance(file, str) or not re.fullmatch(r"[A-Za-z0-9_-]{1,120}\.safetensors", file):
+        raise ValueError(f"the file of an object is a plain name that ends in .safetensors, got {file!r:.80}")
+    return file
 
 
 @lru_cache(maxsize=4)

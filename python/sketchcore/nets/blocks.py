@@ -45,6 +45,8 @@ class Attention(nn.Module):
 
     def __init__(self, width: int, cells: int, heads: int = 8) -> None:
         super().__init__()
+        if width % heads:
+            raise ValueError(f"a width of {width} cannot be shared by {heads} attention heads")
         self.heads = heads
         self.norm = nn.LayerNorm(width)
         self.place = nn.Parameter(0.02 * torch.randn(1, cells, width))

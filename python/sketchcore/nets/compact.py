@@ -10,7 +10,7 @@ round.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,9 @@ from sketchcore.nets.lift import COARSE, lift
 from sketchcore.nets.precision import unit
 from sketchcore.nets.sketches import Sketches
 
+MAX_WIDTH = 4096
+"""Channels of any layer."""
+
 
 @dataclass(frozen=True)
 class CompactConfig:
@@ -37,6 +40,9 @@ class CompactConfig:
         fused: of what a cell reads from one drawing.
         world: of the decoder with 32, 16 and 8 cells along x and y.
         groups: groups of each group normalisation.
+
+    Raises:
+        ValueError: for a width that is no whole number from 1 to 4096.
     """
 
     stem: int = 64
@@ -45,6 +51,15 @@ class CompactConfig:
     fused: int = 32
     world: tuple[int, int, int] = (32, 96, 192)
     groups: int = 8
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value, several = getattr(self, field.name), isinstance(field.default, tuple)
+            each = value if several and isinstance(value, tuple) else (value,)
+            if several and len(each) != 3:
+                raise ValueError(f"{field.name} must be 3 widths, got {value!r:.80}")
+            if not all(type(width) is int and 1 <= width <= MAX_WIDTH for width in each):
+                raise ValueError(f"{field.name} must be whole, 1 to {MAX_WIDTH}, got {value!r:.80}")
 
     @classmethod
     def of_options(cls, options: Mapping[str, Any]) -> CompactConfig:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from functools import reduce
-from typing import Any, Protocol
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial, reduce
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import torch
@@ -24,6 +24,9 @@ from sketchcore.nets.singleview import SingleViewModel
 from sketchcore.nets.sketches import Sketches
 from sketchcore.nets.unet import PaperNet
 from sketchcore.rounds import Volume, update_rounds
+from sketchcore.untrusted import reason
+
+Net = TypeVar("Net", bound=nn.Module)
 
 
 class Model(Protocol):
@@ -179,31 +182,54 @@ def build_model(
         ValueError: if the config names no known network, or the weights do not fit it.
     """
     chosen = pick_device(device)
-    kind, options = config.get("network"), dict(config.get("options", {}))
+    kind, options = config.get("network"), config.get("options", {})
+    if not isinstance(options, dict):
+        raise ValueError(f"the options of a network are an object in the config, got {type(options).__name__}")
     if kind == "compact":
-        try:
-            with _Unfilled():
-                net = CompactNet(CompactConfig.of_options(options))
-        except TypeError as error:
-            raise ValueError(f"the config is of another version of the network 'compact': {error}") from error
-        _fill(net, state)
-        return CompactModel(net, chosen)
+        return CompactModel(_made(lambda: CompactNet(CompactConfig.of_options(options)), state, kind), chosen)
     if kind == "paper":
-        parts = {name.split(".", 1)[0] for name in state}
-        nets = {part: PaperNet(updater=part == "updater", **options) for part in sorted(parts)}
-        if "single" not in nets or not parts <= {"single", "updater"}:
-            raise ValueError(f"weights of the network 'paper' hold 'single' and 'updater', got {sorted(parts)}")
-        for part, net_ in nets.items():
-            _fill(net_, {k.split(".", 1)[1]: v for k, v in state.items() if k.startswith(f"{part}.")})
-        return PaperModel(nets["single"], nets.get("updater"), chosen)
+        parts = sorted({name.split(".", 1)[0] for name in state})
+        if parts not in (["single"], ["single", "updater"]):
+            raise ValueError(f"weights of the network 'paper' hold 'single' and 'updater', got {parts[:5]}")
+        single, *updater = (
+            _made(
+                partial(PaperNet, **{**options, "updater": part == "updater"}),
+                {name.removeprefix(f"{part}."): t for name, t in state.items() if name.startswith(f"{part}.")},
+                kind,
+            )
+            for part in parts
+        )
+        return PaperModel(single, updater[0] if updater else None, chosen)
     if kind == "multiscale":
-        try:
-            multiscale = MultiscaleNet(**options)
-        except TypeError as error:
-            raise ValueError(f"the config is of another version of the network 'multiscale': {error}") from error
-        _fill(multiscale, state)
-        return SingleViewModel(multiscale, chosen)
-    raise ValueError(f"unknown network {kind!r} in the config; 'compact', 'paper' and 'multiscale' are known")
+        return SingleViewModel(_made(lambda: MultiscaleNet(**options), state, kind), chosen)
+    raise ValueError(f"unknown network {kind!r:.80} in the config; 'compact', 'paper' and 'multiscale' are known")
+
+
+def _made(make: Callable[[], Net], state: dict[str, Tensor], kind: str) -> Net:
+    """A network with its weights: these very tensors, which are not copied.
+
+    It is made without memory first. So a config can ask for no more than is in the file of its weights.
+    """
+    try:
+        with torch.device("meta"), _Unfilled():
+            expected = make().state_dict()
+    except (TypeError, ValueError, RuntimeError, ArithmeticError) as error:
+        raise ValueError(
+            f"the config is wrong, or of another version of the network {kind!r}: {reason(error)}"
+        ) from error
+    for name, like in expected.items():
+        given = state.get(name)
+        if given is None:
+            raise ValueError(f"the weights do not fit the network of their config: there is no {name}")
+        if given.shape != like.shape or given.is_floating_point() != like.is_floating_point():
+            sides, has = list(like.shape), f"{list(given.shape)[:8]} of {given.dtype}"
+            raise ValueError(f"the weights do not fit the network of their config: {name} must be {sides}, got {has}")
+    if unknown := sorted(set(state) - set(expected)):
+        raise ValueError(f"the weights do not fit the network of their config: it has no {unknown[0][:80]}")
+    with _Unfilled():
+        net = make()
+    net.load_state_dict(state, assign=True)
+    return net
 
 
 class _Unfilled(TorchFunctionMode):
@@ -212,15 +238,9 @@ class _Unfilled(TorchFunctionMode):
     def __torch_function__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
         if func in _FILLS or getattr(func, "__module__", None) == "torch.nn.init":
             return args[0] if args else kwargs["tensor"]
+        if func is torch.randn:  # without memory at all it would import a second of torch
+            func = torch.empty
         return func(*args, **(kwargs or {}))
 
 
 _FILLS = {Tensor.uniform_, Tensor.normal_, Tensor.zero_, Tensor.fill_}
-
-
-def _fill(net: nn.Module, state: dict[str, Tensor]) -> None:
-    """Gives a network its weights: these very tensors, which are not copied."""
-    try:
-        net.load_state_dict(state, assign=True)
-    except RuntimeError as error:
-        raise ValueError(f"the weights do not fit the network of their config: {error}") from error

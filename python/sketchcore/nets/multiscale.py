@@ -47,8 +47,8 @@ class MultiscaleNet(nn.Module):
 
     def __init__(self, width: int = 64) -> None:
         super().__init__()
-        if width < 2 or width % 2:
-            raise ValueError(f"width must be an even number of at least 2, got {width}")
+        if type(width) is not int or width < 2 or width % 2:
+            raise ValueError(f"width must be an even number of at least 2, got {width!r:.80}")
         self.width = width
         image = 3 * width // 2
         self.scale1 = _WholeImage(width, image)

@@ -51,8 +51,8 @@ class PaperNet(nn.Module):
 
     def __init__(self, updater: bool = False, *, width: int = 64) -> None:
         super().__init__()
-        if width < 1:
-            raise ValueError(f"width must be at least 1, got {width}")
+        if type(width) is not int or width < 1:
+            raise ValueError(f"width must be a whole number, at least 1, got {width!r:.80}")
         self.updater = updater
         self.width = width
         self.encoder = nn.ModuleDict()

@@ -13,15 +13,31 @@ from pathlib import Path
 from typing import Any, cast
 
 import torch
-from safetensors import SafetensorError
 from safetensors.torch import load_file, save
 from torch import Tensor
 
 from sketchcore.atomic import replacing
+from sketchcore.untrusted import check_size, parse_json, reason
 
 SUFFIX = ".safetensors"
 PRETRAINED = cast(Path, files("sketchcore") / "pretrained" / "compact.safetensors")
 """The weights inside the package."""
+MAX_BYTES = 2**31
+"""Of a file of weights."""
+MAX_HEADER = 2**24
+"""Bytes of its header, which says what tensors there are."""
+MAX_CONFIG = 2**20
+"""Bytes of the config."""
+_STORED = (
+    torch.float16,
+    torch.bfloat16,
+    torch.float32,
+    torch.float64,
+    torch.int64,
+    torch.int32,
+    torch.uint8,
+    torch.bool,
+)
 
 
 def save_weights(
@@ -79,27 +95,38 @@ def load_weights(path: str | os.PathLike[str]) -> tuple[dict[str, Tensor], dict[
 
     Raises:
         FileNotFoundError: if the weights or their config are missing.
-        ValueError: if the suffix is wrong, either file is truncated, corrupt or of another kind, or a weight
-            is not finite.
+        ValueError: if the suffix is wrong, either file is truncated, corrupt, of another kind or too large (weights
+            2 GiB, their header 16 MiB, the config 1 MiB), or a weight is not finite.
     """
     path = _checked(path)
     config_path = path.with_suffix(".json")
-    if not path.is_file():
-        raise FileNotFoundError(f"no weights at {path}")
+    check_size(path, MAX_BYTES, "file of weights")
     if not config_path.is_file():
         raise FileNotFoundError(f"weights {path} need their config beside them; {config_path} is missing")
-    try:
-        config = json.loads(config_path.read_bytes())
-    except ValueError as error:
-        raise ValueError(f"config {config_path} is not valid JSON: {error}") from error
+    check_size(config_path, MAX_CONFIG, "config")
+    config = parse_json(config_path.read_bytes(), f"config {config_path}")
     if not isinstance(config, dict):
         raise ValueError(f"config {config_path} must be a JSON object, got {type(config).__name__}")
-    try:
-        stored: dict[str, Tensor] = load_file(path)
-    except SafetensorError as error:
-        raise ValueError(f"weights {path} are truncated, corrupt or no safetensors file: {error}") from error
+    stored = _tensors(path)
     _refuse_non_finite(stored, f"in {path}")
     return {name: _widened(stored.pop(name)) for name in list(stored)}, config
+
+
+def _tensors(path: Path) -> dict[str, Tensor]:
+    damaged = f"weights {path} are truncated, corrupt or no safetensors file"
+    with path.open("rb") as file:
+        if int.from_bytes(file.read(8), "little") > MAX_HEADER:
+            raise ValueError(f"{damaged}: their header would have more than {MAX_HEADER // 2**20} MiB")
+    try:
+        stored: dict[str, Tensor] = load_file(path)
+    except MemoryError:
+        raise
+    except Exception as error:  # what dtypes and sizes torch cannot have, it says in its own ways
+        raise ValueError(f"{damaged}: {reason(error)}") from error
+    for name, tensor in stored.items():
+        if tensor.dtype not in _STORED:
+            raise ValueError(f"weights {path} hold {name[:80]} as {tensor.dtype}; networks have float16 to float64")
+    return stored
 
 
 def _widened(tensor: Tensor) -> Tensor:

@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import SafetensorError, safe_open
+from safetensors import safe_open
 from safetensors.torch import save
 from torch import Tensor
 
 from sketchcore.atomic import write_atomically
+from sketchcore.untrusted import parse_json, reason
 
 
 @dataclass
@@ -37,6 +38,16 @@ class Progress:
     waited: float = 0.0
     iou: float | None = None
     began: dict[str, Any] | None = None
+
+    def check(self) -> None:
+        """Refuses what cannot be gone on with.
+
+        Raises:
+            ValueError: for counts that are no counts.
+        """
+        counts = (self.step, self.samples, self.seconds, self.waited)
+        if not isinstance(self.stage, str) or not all(type(n) in (int, float) and n >= 0 for n in counts):
+            raise ValueError("its progress must have a stage by name, and counts that are 0 or more")
 
     def speed(self) -> str:
         """Samples a second, and the share of the time that was spent waiting for them, in words."""
@@ -105,8 +116,10 @@ def load_checkpoint(path: Path) -> Checkpoint:
     moments: dict[int, dict[int, dict[str, Tensor]]] = {}
     try:
         with safe_open(path, framework="pt") as file:
-            said = {name: json.loads(text) for name, text in file.metadata().items()}
+            metadata = file.metadata() or {}
+            said = {name: parse_json(metadata[name], name) for name in ("progress", "task")}
             progress, task = Progress(**said["progress"]), dict(said["task"])
+            progress.check()
             for key in file.keys():  # noqa: SIM118, a safetensors file is no mapping
                 kind, name = key.split(".", 1)
                 if kind == "optimizer":
@@ -115,7 +128,9 @@ def load_checkpoint(path: Path) -> Checkpoint:
                     of_parameter[moment] = file.get_tensor(key)
                 else:
                     kinds[kind][name] = file.get_tensor(key)
-    except (SafetensorError, KeyError, TypeError, ValueError) as error:
-        raise ValueError(f"{path} is no checkpoint of sketchcore train: {error}") from error
+    except MemoryError:
+        raise
+    except Exception as error:  # what dtypes and sizes torch cannot have, it says in its own ways
+        raise ValueError(f"{path} is no checkpoint of sketchcore train: {reason(error)}") from error
     under_way, random = kinds["under_way"], kinds["random"].get("cpu")
     return Checkpoint(kinds["model"], kinds["average"], moments, progress, task, under_way, random)

@@ -176,3 +176,10 @@ fn nothing_to_do_changes_nothing() {
     assert_eq!(before, after);
     bilateral(&mut [], &[], &USUAL).unwrap();
 }
+
+#[test]
+fn coordinates_as_large_as_numbers_can_be_stay_finite() {
+    let mut vertices = vec![[0.0; 3], [0.0; 3], [0.0, 0.0, f64::MAX]];
+    bilateral(&mut vertices, &[[2, 2, 0]], &USUAL).unwrap();
+    assert!(vertices.as_flattened().iter().all(|v| v.is_finite()));
+}
