@@ -100,6 +100,8 @@ def load_weights(path: str | os.PathLike[str]) -> tuple[dict[str, Tensor], dict[
     """
     path = _checked(path)
     config_path = path.with_suffix(".json")
+    if not path.is_file():
+        raise FileNotFoundError(f"no weights at {path}")
     check_size(path, MAX_BYTES, "file of weights")
     if not config_path.is_file():
         raise FileNotFoundError(f"weights {path} need their config beside them; {config_path} is missing")
