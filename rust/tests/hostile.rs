@@ -119,7 +119,7 @@ proptest! {
     }
 
     #[test]
-    fn any_mesh_has_voxels_and_buffers_or_is_refused((vertices, faces) in mesh(), camera in camera(), degrees in number()) {
+    fn any_mesh_has_voxels_and_buffers_or_is_refused((vertices, faces) in mesh(), camera in camera(), degrees in finite()) {
         let grid = solid::voxelize(&vertices, &faces);
         let surface = Surface::new(&vertices, &faces, (degrees * 90.0).clamp(0.0, 90.0));
         prop_assert_eq!(grid.is_err(), surface.is_err());
