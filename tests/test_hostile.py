@@ -24,7 +24,7 @@ from sketchcore import gltfcheck, meshfile, untrusted, volume
 from sketchcore.app.photo import read_photo
 from sketchcore.app.session import Session
 from sketchcore.app.sessionfile import read_session, write_session
-from sketchcore.datagen.prepared import Prepared, load_found, load_object
+from sketchcore.datagen.prepared import VERSION, Prepared, load_found, load_object
 from sketchcore.meshfile import load_mesh
 from sketchcore.nets import weights
 from sketchcore.nets.compact import CompactConfig
@@ -341,7 +341,7 @@ def test_checkpoints_that_are_none_say_so(told: dict[str, str] | None, tmp_path:
     path.write_bytes(save({"model.a": torch.ones(1)}, metadata=told))
     with pytest.raises(ValueError, match="is no checkpoint of sketchcore train"):
         load_checkpoint(path)
-    save_checkpoint(path, {"a": torch.ones(1)}, {}, [], Progress("one", 3), {"seed": "0"})
+    save_checkpoint(path, {"a": torch.ones(1)}, {}, [], Progress("one", 3), {"seed": "0"}, {})
     assert load_checkpoint(path).progress.step == 3
 
 
@@ -436,7 +436,7 @@ def test_a_session_file_that_points_before_its_beginning_is_refused() -> None:
 )
 def test_an_index_names_files_in_its_folder_alone(name: object, tmp_path: Path) -> None:
     entry = {"file": name, "split": "train", "sha256": "ab"}
-    (tmp_path / "dataset.json").write_text(json.dumps({"format": 1, "objects": [entry]}))
+    (tmp_path / "dataset.json").write_text(json.dumps({"format": VERSION, "objects": [entry]}))
     with pytest.raises(ValueError, match=r"plain name that ends in \.safetensors"):
         Prepared(tmp_path)
 

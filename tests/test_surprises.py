@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import io
 import json
 import platform
 import re
 import subprocess
 import sys
+import tokenize
 from pathlib import Path
 
 import pytest
@@ -93,15 +95,30 @@ except PermissionError:
 
 def test_no_code_of_the_package_unpickles() -> None:
     wrong = re.compile(
-        r"\bimport (pickle|dill|cloudpickle|joblib|shelve|marshal)\b|torch\.load\b|allow_pickle=True|(?<![.\w])eval\("
+        r"\b(import|from) (pickle|dill|cloudpickle|joblib|shelve|marshal)\b|torch\.load\b|allow_pickle=True"
+        r"|(?<![.\w])(eval|exec)\("
     )
     found = [
         f"{path.name}:{number}"
         for path in PACKAGE.rglob("*.py")
-        for number, line in enumerate(path.read_text().splitlines(), 1)
+        for number, line in enumerate(_without_strings(path.read_text()).splitlines(), 1)
         if wrong.search(line)
     ]
     assert found == []
+
+
+def _without_strings(code: str) -> str:
+    """Code whose strings are empty; as many lines as before."""
+    lines = code.splitlines(keepends=True)
+    kinds = (tokenize.STRING, getattr(tokenize, "FSTRING_MIDDLE", tokenize.STRING))
+    strings = [t for t in tokenize.generate_tokens(io.StringIO(code).readline) if t.type in kinds]
+    for token in reversed(strings):
+        (top, left), (bottom, right) = token.start, token.end
+        whole = "".join(lines[top - 1 : bottom])
+        begin, end = left, len(whole) - (len(lines[bottom - 1]) - right)
+        blank = "\n" * whole[begin:end].count("\n")
+        lines[top - 1 : bottom] = (whole[:begin] + blank + whole[end:]).splitlines(keepends=True)
+    return "".join(lines)
 
 
 def test_servers_listen_to_this_machine_alone_unless_told() -> None:

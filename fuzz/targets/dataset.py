@@ -12,7 +12,7 @@ import trimesh
 from harness import SCRATCH, Target
 from mutations import dump, of_bytes, of_json, of_safetensors
 from sketchcore.datagen.cleaning import place
-from sketchcore.datagen.prepared import MeshObject, Prepared, load_found, save_object
+from sketchcore.datagen.prepared import VERSION, MeshObject, Prepared, load_found, save_object
 
 _FOLDER = SCRATCH / "dataset"
 
@@ -39,7 +39,7 @@ def seeds() -> list[bytes]:
     path = Path(SCRATCH / "box.safetensors")
     save_object(path, MeshObject(made.vertices, made.faces, made.world), made.found)
     entry = {"file": "box.safetensors", "source": "box.obj", "sha256": "ab" * 32, "split": "train", **made.found}
-    index = {"format": 1, "options": {"up": "y", "split": [0.8, 0.1, 0.1]}, "objects": [entry]}
+    index = {"format": VERSION, "options": {"up": "y", "split": [0.8, 0.1, 0.1]}, "objects": [entry]}
     return [_input(dump(index), path.read_bytes())]
 
 
