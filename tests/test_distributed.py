@@ -44,7 +44,8 @@ def recorded(loop, part):
 _Loop._step = recorded
 for task in tasks:
     folder = out if rank == "0" else out / "elsewhere"  # machines have no folder in common
-    run = Run(folder / task["name"], task["preset"], options=task["options"], changes={"batch": task.get("batch", 1), "warmup": 2},
+    changes = {"batch": task.get("batch", 1), "warmup": 2}
+    run = Run(folder / task["name"], task["preset"], options=task["options"], changes=changes,
               steps=task.get("steps"), minutes=task.get("minutes"))
     progress = train(run, resume=task.get("resume", False), quiet=True)
     said = {"losses": losses, "steps": [p.step for p in progress], "samples": [p.samples for p in progress]}

@@ -38,7 +38,7 @@ VIEWS = ("quarter-037", "right")
 SHAPES = 16
 PATIENCE = 120.0
 """Seconds that a server may take to begin, and an answer to come."""
-LEVELS = (1, 2, 4, 8, 16, 32, 64)
+LEVELS = "1,2,4,8,16,32,64"
 SETUPS = ((1, 1), (2, 1), (4, 1), (2, 2), (4, 4), (8, 8))
 """Workers, and objects in a pass of the network."""
 
@@ -206,7 +206,7 @@ def by_clients(options: argparse.Namespace, files: list[list[bytes]]) -> list[di
     rows = []
     with serving(options.server) as server:
         measure(server, 4, options.seconds / 2, files)  # memory that is taken once, and warm caches
-        for level in LEVELS:
+        for level in map(int, options.levels.split(",")):
             row = measure(server, level, options.seconds, files)
             wrong = sum(row.errors.values())
             print(
@@ -257,6 +257,7 @@ def main() -> None:
     kinds = {"clients": by_clients, "setups": by_setups, "memory": by_time}
     parser.add_argument("kind", choices=kinds)
     parser.add_argument("--seconds", type=float, default=20.0, help="for each level of load")
+    parser.add_argument("--levels", default=LEVELS, help="numbers of clients")
     parser.add_argument("--minutes", type=float, default=10.0, help="for memory")
     parser.add_argument("--every", type=float, default=60.0, help="seconds between looks at the memory")
     parser.add_argument("--clients", type=int, default=8, help="for memory")
