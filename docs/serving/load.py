@@ -107,11 +107,13 @@ class Answers:
     Attributes:
         latencies: seconds from a request that was taken on to the last byte of its answer.
         refused: answers 503.
+        late: answers 504.
         errors: anything else that is no solid, by what it is.
     """
 
     latencies: list[float] = field(default_factory=list)
     refused: int = 0
+    late: int = 0
     errors: Counter[str] = field(default_factory=Counter)
 
 
@@ -148,6 +150,8 @@ async def client(url: str, number: int, files: list[list[bytes]], until: float, 
             elif answer.status_code == 503 and "retry-after" in answer.headers:
                 answers.refused += 1
                 await asyncio.sleep(min(float(answer.headers["retry-after"]), max(0.0, until - time.monotonic())))
+            elif answer.status_code == 504:
+                answers.late += 1
             else:
                 answers.errors[f"{answer.status_code}: {answer.text[:200]}"] += 1
 
@@ -168,7 +172,8 @@ class Row:
         throughput: of these, a second.
         cpu: seconds of processor time that the server took for each, which other work on the machine hardly changes.
         p50, p95, p99: milliseconds that half, 95 % and 99 % of the answers took at most.
-        refused: how many requests were.
+        refused: how many requests were (503).
+        late: how many were not answered in time (504).
         errors: all others that brought no solid.
         before, after: megabytes of the server's memory.
     """
@@ -181,6 +186,7 @@ class Row:
     p95: float
     p99: float
     refused: int
+    late: int
     errors: dict[str, int]
     before: float
     after: float
@@ -197,12 +203,21 @@ def measure(server: Server, clients: int, seconds: float, files: list[list[bytes
     cpu = (server.cpu() - spent) / solids
     errors = dict(answers.errors)
     p50, p95, p99 = cuts[49], cuts[94], cuts[98]
-    return Row(clients, solids, solids / took, cpu, p50, p95, p99, answers.refused, errors, before, server.rss())
+    refusals = (answers.refused, answers.late)
+    return Row(clients, solids, solids / took, cpu, p50, p95, p99, *refusals, errors, before, server.rss())
+
+
+def report(row: Row) -> None:
+    """What went wrong, beside the table."""
+    for error, count in row.errors.items():
+        print(f"{count} times with {row.clients} clients: {error}", file=sys.stderr, flush=True)
 
 
 def by_clients(options: argparse.Namespace, files: list[list[bytes]]) -> list[dict[str, Any]]:
-    print("| clients | solids/s | CPU s each | p50 ms | p95 ms | p99 ms | solids | 503 | other errors | memory MB |")
-    print("|---|---|---|---|---|---|---|---|---|---|")
+    print(
+        "| clients | solids/s | CPU s each | p50 ms | p95 ms | p99 ms | solids | 503 | 504 | other errors | memory MB |"
+    )
+    print("|---" * 11 + "|")
     rows = []
     with serving(options.server) as server:
         measure(server, 4, options.seconds / 2, files)  # memory that is taken once, and warm caches
@@ -211,10 +226,11 @@ def by_clients(options: argparse.Namespace, files: list[list[bytes]]) -> list[di
             wrong = sum(row.errors.values())
             print(
                 f"| {row.clients} | {row.throughput:.2f} | {row.cpu:.2f} | {row.p50:.0f} | {row.p95:.0f} "
-                f"| {row.p99:.0f} | {row.solids} | {row.refused} | {wrong} | {row.before:.0f} -> {row.after:.0f} |",
+                f"| {row.p99:.0f} | {row.solids} | {row.refused} | {row.late} | {wrong} | {row.before:.0f} -> {row.after:.0f} |",
                 flush=True,
             )
             rows.append(asdict(row))
+            report(row)
     return rows
 
 
@@ -237,18 +253,21 @@ def by_setups(options: argparse.Namespace, files: list[list[bytes]]) -> list[dic
 
 
 def by_time(options: argparse.Namespace, files: list[list[bytes]]) -> list[dict[str, Any]]:
-    print(f"{options.clients} clients.\n\n| after s | memory MB | solids | refused (503) | other errors |")
-    print("|---|---|---|---|---|")
+    print(f"{options.clients} clients.\n\n| after s | memory MB | solids | 503 | 504 | other errors |")
+    print("|---" * 6 + "|")
     rows = []
     with serving(options.server) as server:
-        print(f"| 0 | {server.rss():.0f} | 0 | 0 | 0 |")
+        print(f"| 0 | {server.rss():.0f} | 0 | 0 | 0 | 0 |")
         begun = time.monotonic()
         for _ in range(max(1, round(60 * options.minutes / options.every))):
             row = measure(server, options.clients, options.every, files)
             wrong = sum(row.errors.values())
             after = time.monotonic() - begun
-            print(f"| {after:.0f} | {row.after:.0f} | {row.solids} | {row.refused} | {wrong} |", flush=True)
+            print(
+                f"| {after:.0f} | {row.after:.0f} | {row.solids} | {row.refused} | {row.late} | {wrong} |", flush=True
+            )
             rows.append(asdict(row) | {"seconds": after})
+            report(row)
     return rows
 
 
