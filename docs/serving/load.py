@@ -213,59 +213,56 @@ def report(row: Row) -> None:
         print(f"{count} times with {row.clients} clients: {error}", file=sys.stderr, flush=True)
 
 
+def line(*cells: object) -> None:
+    print("|", " | ".join(f"{cell:.0f}" if isinstance(cell, float) else str(cell) for cell in cells), "|", flush=True)
+
+
+def head(*names: str) -> None:
+    line(*names)
+    print("|---" * len(names) + "|")
+
+
 def by_clients(options: argparse.Namespace, files: list[list[bytes]]) -> list[dict[str, Any]]:
-    print(
-        "| clients | solids/s | CPU s each | p50 ms | p95 ms | p99 ms | solids | 503 | 504 | other errors | memory MB |"
-    )
-    print("|---" * 11 + "|")
+    times = ("p50 ms", "p95 ms", "p99 ms")
+    head("clients", "solids/s", "CPU s each", *times, "solids", "503", "504", "other errors", "memory MB")
     rows = []
     with serving(options.server) as server:
         measure(server, 4, options.seconds / 2, files)  # memory that is taken once, and warm caches
         for level in map(int, options.levels.split(",")):
             row = measure(server, level, options.seconds, files)
-            wrong = sum(row.errors.values())
-            print(
-                f"| {row.clients} | {row.throughput:.2f} | {row.cpu:.2f} | {row.p50:.0f} | {row.p95:.0f} "
-                f"| {row.p99:.0f} | {row.solids} | {row.refused} | {row.late} | {wrong} | {row.before:.0f} -> {row.after:.0f} |",
-                flush=True,
-            )
+            speed = (f"{row.throughput:.2f}", f"{row.cpu:.2f}", row.p50, row.p95, row.p99)
+            wrong = (row.refused, row.late, sum(row.errors.values()))
+            line(level, *speed, row.solids, *wrong, f"{row.before:.0f} -> {row.after:.0f}")
             rows.append(asdict(row))
             report(row)
     return rows
 
 
 def by_setups(options: argparse.Namespace, files: list[list[bytes]]) -> list[dict[str, Any]]:
-    print("| workers | objects in a pass | 1 client: solids/s | CPU s each | p50 ms ", end="")
-    print("| 8 clients: solids/s | CPU s each | p50 ms | p95 ms |")
-    print("|---|---|---|---|---|---|---|---|---|")
+    one_client = ("1 client: solids/s", "CPU s each", "p50 ms")
+    head("workers", "objects in a pass", *one_client, "8 clients: solids/s", "CPU s each", "p50 ms", "p95 ms")
     rows = []
     for workers, batch in SETUPS:
         with serving([*options.server, "--workers", str(workers), "--batch", str(batch)]) as server:
             measure(server, 4, options.seconds / 4, files)
             one, eight = (measure(server, level, options.seconds, files) for level in (1, 8))
-        print(
-            f"| {workers} | {batch} | {one.throughput:.2f} | {one.cpu:.2f} | {one.p50:.0f} "
-            f"| {eight.throughput:.2f} | {eight.cpu:.2f} | {eight.p50:.0f} | {eight.p95:.0f} |",
-            flush=True,
-        )
+        first, second = ((f"{row.throughput:.2f}", f"{row.cpu:.2f}", row.p50) for row in (one, eight))
+        line(workers, batch, *first, *second, eight.p95)
         rows.append({"workers": workers, "batch": batch, "1": asdict(one), "8": asdict(eight)})
     return rows
 
 
 def by_time(options: argparse.Namespace, files: list[list[bytes]]) -> list[dict[str, Any]]:
-    print(f"{options.clients} clients.\n\n| after s | memory MB | solids | 503 | 504 | other errors |")
-    print("|---" * 6 + "|")
+    print(f"{options.clients} clients.\n")
+    head("after s", "memory MB", "solids", "503", "504", "other errors")
     rows = []
     with serving(options.server) as server:
-        print(f"| 0 | {server.rss():.0f} | 0 | 0 | 0 | 0 |")
+        line(0, server.rss(), 0, 0, 0, 0)
         begun = time.monotonic()
         for _ in range(max(1, round(60 * options.minutes / options.every))):
             row = measure(server, options.clients, options.every, files)
-            wrong = sum(row.errors.values())
             after = time.monotonic() - begun
-            print(
-                f"| {after:.0f} | {row.after:.0f} | {row.solids} | {row.refused} | {row.late} | {wrong} |", flush=True
-            )
+            line(after, row.after, row.solids, row.refused, row.late, sum(row.errors.values()))
             rows.append(asdict(row) | {"seconds": after})
             report(row)
     return rows
