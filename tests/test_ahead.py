@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from itertools import islice
+from itertools import count, islice
 
 import pytest
 
@@ -17,7 +17,7 @@ def test_everything_comes_in_order(threads: int | None) -> None:
         time.sleep(0.01 if index % 2 == 0 else 0.0)
         return index * index
 
-    ahead = Ahead(slower_if_even, 5, stock=4, threads=threads)
+    ahead = Ahead(slower_if_even, count(5), stock=4, threads=threads)
     try:
         assert list(islice(ahead, 12)) == [i * i for i in range(5, 17)]
     finally:
@@ -26,7 +26,7 @@ def test_everything_comes_in_order(threads: int | None) -> None:
 
 def test_so_many_are_made_ahead_and_no_more() -> None:
     made: list[int] = []
-    ahead = Ahead(made.append, 0, stock=3)
+    ahead = Ahead(made.append, count(0), stock=3)
     try:
         deadline = time.monotonic() + 10
         while len(made) < 3 and time.monotonic() < deadline:
@@ -40,7 +40,7 @@ def test_so_many_are_made_ahead_and_no_more() -> None:
 def test_several_are_made_at_once() -> None:
     # A barrier lets nobody through before all three have come.
     together = threading.Barrier(3, timeout=10)
-    ahead = Ahead(lambda index: together.wait() >= 0, 0, stock=3, threads=3)
+    ahead = Ahead(lambda index: together.wait() >= 0, count(0), stock=3, threads=3)
     try:
         assert all(islice(ahead, 3))
     finally:
@@ -56,7 +56,7 @@ def test_waiting_is_told_from_what_was_ready() -> None:
             assert released.wait(10)
         return index
 
-    ahead = Ahead(first_only, 0, stock=2)
+    ahead = Ahead(first_only, count(0), stock=2)
     try:
         time.sleep(0.05)
         next(ahead)
@@ -75,7 +75,7 @@ def test_an_error_comes_in_its_place() -> None:
             raise ValueError("no sample 2")
         return index
 
-    ahead = Ahead(fails_at_two, 0, stock=4)
+    ahead = Ahead(fails_at_two, count(0), stock=4)
     try:
         assert [next(ahead), next(ahead)] == [0, 1]
         with pytest.raises(ValueError, match="no sample 2"):
@@ -93,11 +93,11 @@ def test_closing_stops_what_has_not_begun() -> None:
         assert released.wait(10)
         made.append(index)
 
-    ahead = Ahead(held, 0, stock=50)
+    ahead = Ahead(held, count(0), stock=50)
     assert begun.wait(10)
     threading.Timer(0.05, released.set).start()
     ahead.close()
-    count = len(made)
-    assert count < 50
+    finished = len(made)
+    assert finished < 50
     time.sleep(0.02)
-    assert len(made) == count
+    assert len(made) == finished

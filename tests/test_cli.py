@@ -24,7 +24,7 @@ def run(*arguments: object, ok: bool = True) -> str:
     return result.stdout if ok else result.stderr
 
 
-@pytest.mark.parametrize("command", ["reconstruct", "generate", "prepare", "train", "evaluate", "bench"])
+@pytest.mark.parametrize("command", ["reconstruct", "generate", "prepare", "train", "evaluate", "bench", "serve"])
 def test_every_command_explains_itself(command: str) -> None:
     assert command in run("--help")
     assert len(run(command, "--help")) > 200

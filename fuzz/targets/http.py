@@ -17,9 +17,9 @@ from fastapi import FastAPI
 
 from harness import SCRATCH, Target
 from mutations import dump, of_bytes, of_json
-from sketchcore.app.guard import Guard
 from sketchcore.app.server import Server, build_router
 from sketchcore.app.store import Store
+from sketchcore.asgi.guard import Guard
 
 _LOADED = skimage.filters, skimage.measure
 _BALL = (np.linalg.norm(np.indices((64, 64, 64)) / 63 - 0.5, axis=0) < 0.3).astype(np.float32)

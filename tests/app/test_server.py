@@ -25,10 +25,11 @@ from hand import FIRST, HIGH, LOW, box_edges
 from typer.testing import CliRunner
 
 from sketchcore.app.events import Hub
-from sketchcore.app.guard import Guard
-from sketchcore.app.launch import is_local, sessions_folder
+from sketchcore.app.launch import sessions_folder
 from sketchcore.app.server import MAX_CHANGE, Server, build_router
 from sketchcore.app.store import Store
+from sketchcore.asgi.address import is_local
+from sketchcore.asgi.guard import Guard
 from sketchcore.cli import app as command_line
 
 BALL = np.linalg.norm(np.indices((64, 64, 64)) / 63 - 0.5, axis=0) < 0.3

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import ipaddress
 import os
 import sys
 from pathlib import Path
 from typing import Any
+
+from sketchcore.asgi.address import announce, is_local, own_names
 
 _GOODBYE = 2
 """Seconds that open connections get once the server is told to end."""
@@ -22,16 +23,6 @@ def sessions_folder() -> Path:
     else:
         base = Path(os.environ.get("XDG_DATA_HOME") or home / ".local" / "share")
     return base / "sketchcore" / "sessions"
-
-
-def is_local(host: str) -> bool:
-    """Whether only this machine can reach what listens at a host."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 def launch(
@@ -56,28 +47,20 @@ def launch(
     """
     from nicegui import app, ui
 
-    from sketchcore.app.guard import Guard
     from sketchcore.app.page import build_page
     from sketchcore.app.server import Server, build_router
     from sketchcore.app.store import Store
+    from sketchcore.asgi.guard import Guard
 
     store = Store(Path(sessions) if sessions is not None else sessions_folder())
     local = is_local(host)
     server = Server(store, model, open=local)
     app.include_router(build_router(server))
-    app.add_middleware(Guard, hosts=("localhost", "127.0.0.1", "::1", host) if local else None)
+    app.add_middleware(Guard, hosts=own_names(host) if local else None)
     build_page()
     app.on_shutdown(server.close)
-    shown = f"[{host}]" if ":" in host else host
-    print(f"sketchcore app: http://{shown}:{port} (Ctrl+C ends it)", flush=True)
+    announce("sketchcore app", host, port)
     print(f"sessions: {store.folder}", flush=True)
-    if not local:
-        print(
-            f"warning: it listens on {host}, so others may reach it from the network; there are no passwords. "
-            "Leave out --host to keep it to this machine.",
-            file=sys.stderr,
-            flush=True,
-        )
     ui.run(
         host=host,
         port=port,

@@ -10,32 +10,30 @@ from __future__ import annotations
 
 import gzip
 import json
-import re
 import tempfile
 import threading
-import unicodedata
 from collections import OrderedDict
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
 import numpy as np
 from fastapi import APIRouter, Request, Response
-from fastapi.routing import APIRoute
 from starlette.concurrency import run_in_threadpool
-from starlette.responses import JSONResponse, StreamingResponse
+from starlette.responses import StreamingResponse
 
 from sketchcore import advice
 from sketchcore.app import hints, photo
 from sketchcore.app.document import listed, placement_from_json, stroke_from_json, stroke_to_json
 from sketchcore.app.events import Hub, sent_state
 from sketchcore.app.examples import read_scene, read_tour
-from sketchcore.app.guard import TooLargeError, body_length
 from sketchcore.app.session import Session
 from sketchcore.app.sessionfile import MAX_FILE, SUFFIX
 from sketchcore.app.store import NotKeptError, Store
 from sketchcore.app.workers import Reconstruct, Workers
+from sketchcore.asgi.files import attachment
+from sketchcore.asgi.guard import TooLargeError, body_length
+from sketchcore.asgi.sentences import sentence_route
 from sketchcore.camera import check_viewpoint
 from sketchcore.mesh import MESH_SUFFIXES, extract_mesh, save_mesh
 from sketchcore.reconstruction import load_model
@@ -67,30 +65,7 @@ _CHANGES: dict[str, tuple[str, ...]] = {
 """What can be done to a session, and what has to be said with it."""
 
 
-class _Route(APIRoute):
-    """A route whose errors are {"error": sentence}."""
-
-    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        handle = super().get_route_handler()
-
-        async def careful(request: Request) -> Response:
-            try:
-                return await handle(request)
-            except TooLargeError as error:
-                return _error(413, error)
-            except KeyError as error:
-                return _error(404, error)
-            except (ValueError, TypeError) as error:
-                return _error(400, error)
-            except NotKeptError as error:
-                return _error(507, error)
-
-        return careful
-
-
-def _error(status: int, error: Exception) -> Response:
-    message = str(error.args[0] if error.args else error)
-    return JSONResponse({"error": message[:1].upper() + message[1:]}, status)
+_Route = sentence_route({TooLargeError: 413, KeyError: 404, ValueError: 400, TypeError: 400, NotKeptError: 507})
 
 
 class Server:
@@ -256,17 +231,6 @@ async def _body(request: Request, limit: int) -> bytes:
     return bytes(body)
 
 
-def _attachment(content: bytes, name: str, suffix: str, media: str) -> Response:
-    """A file to save, named after the session."""
-    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
-    plain = re.sub(r"[^A-Za-z0-9 _-]+", "", plain).strip() or "sketch"
-    names = f"filename=\"{plain}{suffix}\"; filename*=UTF-8''{quote(name, safe='')}{suffix}"
-    return Response(content, media_type=media, headers={"Content-Disposition": f"attachment; {names}"})
-
-
-_MEDIA = {".glb": "model/gltf-binary", ".obj": "model/obj", ".stl": "model/stl", ".ply": "application/octet-stream"}
-
-
 def build_router(server: Server) -> APIRouter:
     """The routes, to be included in NiceGUI's app, or in any FastAPI."""
     router = APIRouter(prefix="/api", route_class=_Route)
@@ -341,12 +305,12 @@ def build_router(server: Server) -> APIRouter:
             path = Path(folder) / f"mesh.{suffix}"
             save_mesh(extract_mesh(scene.astype(np.float32) / 255), path)
             content = path.read_bytes()
-        return _attachment(content, session.document.name, f".{suffix}", _MEDIA[f".{suffix}"])
+        return attachment(content, session.document.name, f".{suffix}")
 
     @router.get("/s/{id}/file")
     def file(id: str) -> Response:
         session = store.get(id)
-        return _attachment(store.export_file(session), session.document.name, SUFFIX, "application/zip")
+        return attachment(store.export_file(session), session.document.name, SUFFIX)
 
     @router.get("/s/{id}/advice")
     def best_view(id: str) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -45,7 +46,8 @@ def train(
     """Train networks on samples straight from the generator; say --minutes or --steps, or take laptop or gpu.
 
     With --data, samples are drawn from the meshes of a data set's training split, and the held-out IoU is that of its
-    validation split; --from begins with weights that know other shapes already.
+    validation split; --from begins with weights that know other shapes already. torchrun -m sketchcore.train takes the
+    same options, and trains in several processes.
     """
     with errors():
         from dataclasses import asdict
@@ -61,6 +63,8 @@ def train(
         except KeyboardInterrupt:
             typer.echo(f"stopped; go on with --resume -o {out}", err=True)
             raise typer.Exit(130) from None
+    if os.environ.get("RANK", "0") != "0":  # what torchrun started beside the first
+        return
     if as_json:
         typer.echo(json.dumps([asdict(stage) for stage in stages]))
     else:

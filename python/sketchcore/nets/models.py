@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from functools import partial, reduce
 from typing import Any, Protocol, TypeVar
 
@@ -22,6 +23,7 @@ from sketchcore.nets.precision import autocast, pick_device, place, unit
 from sketchcore.nets.search import in_place
 from sketchcore.nets.singleview import SingleViewModel
 from sketchcore.nets.sketches import Sketches
+from sketchcore.nets.together import Passes
 from sketchcore.nets.unet import PaperNet
 from sketchcore.rounds import Volume, update_rounds
 from sketchcore.untrusted import reason
@@ -78,8 +80,14 @@ class CompactModel:
     """
 
     def __init__(self, net: CompactNet, device: torch.device) -> None:
-        self.net = CompactInference(net, device)
+        self.net: Passes = CompactInference(net, device)
         self.device = device
+
+    def by(self, passes: Passes) -> CompactModel:
+        """The same model, its passes made by somebody else, such as `nets/together.py`."""
+        other = copy(self)
+        other.net = passes
+        return other
 
     def first_predictions(self, samples: Sequence[Sketches]) -> Iterator[Volume]:
         for first in range(0, len(samples), BATCH):

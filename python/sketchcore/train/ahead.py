@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Generic, TypeVar
 
@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 class Ahead(Generic[T]):
-    """An endless iterator over `make(first)`, `make(first + 1)`, ..., in this order, made on threads of its own.
+    """An endless iterator over `make(number)` for endless numbers, in their order, made on threads of its own.
 
     What `make` raises is raised in the place of what it would have returned.
 
@@ -22,24 +22,23 @@ class Ahead(Generic[T]):
 
     Args:
         make: called on several threads at once, if there are several.
-        first: its first argument.
+        numbers: its arguments, such as `itertools.count()`.
         stock: how many are made ahead.
         threads: how many threads make them; None for one a core.
     """
 
-    def __init__(self, make: Callable[[int], T], first: int, stock: int, threads: int | None = 1) -> None:
+    def __init__(self, make: Callable[[int], T], numbers: Iterator[int], stock: int, threads: int | None = 1) -> None:
         threads = threads or os.cpu_count() or 1
         self.waited = 0.0
         self._make = make
-        self._index = first
+        self._numbers = numbers
         self._pool = ThreadPoolExecutor(threads)
         self._coming: deque[Future[T]] = deque()
         for _ in range(max(stock, threads)):
             self._order()
 
     def _order(self) -> None:
-        self._coming.append(self._pool.submit(self._make, self._index))
-        self._index += 1
+        self._coming.append(self._pool.submit(self._make, next(self._numbers)))
 
     def __iter__(self) -> Ahead[T]:
         return self

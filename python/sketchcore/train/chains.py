@@ -7,9 +7,10 @@ new shape.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from sketchcore.nets.models import CompactModel
 from sketchcore.nets.precision import autocast, place, unit
 from sketchcore.nets.sketches import Sketches
 from sketchcore.train.ahead import Ahead
+from sketchcore.train.distributed import ALONE, Ranks
 from sketchcore.train.heldout import heldout_iou
 from sketchcore.train.loss import distance_loss, occupancy_loss
 from sketchcore.train.presets import Preset
@@ -58,14 +60,34 @@ class Chain:
     index: int = 0
 
 
+def plan_chain(seed: int, index: int) -> tuple[int, int]:
+    """How many drawings and passes chain number `index` of a seed has: that depends on these two alone."""
+    random = np.random.default_rng((seed, index))
+    views = 1 + int(random.choice(len(DRAWINGS), p=DRAWINGS))
+    return views, 1 + int(random.choice(len(PASSES), p=PASSES))
+
+
+def plan_batches(seed: int, first: int, left: Sequence[int]) -> Iterator[list[tuple[int, int]]]:
+    """For each step, the slots of a batch in which a chain starts, and the chains' numbers: `first` and on.
+
+    `left` has the passes that are left of the chain in each slot, 0 where there is none. So processes that share a batch
+    know which chains are whose, and need not ask each other.
+    """
+    numbers, left = count(first), list(left)
+    while True:
+        starts = [(slot, next(numbers)) for slot, passes in enumerate(left) if passes == 0]
+        for slot, index in starts:
+            left[slot] = plan_chain(seed, index)[1]
+        left = [passes - 1 for passes in left]
+        yield starts
+
+
 def start_chain(preset: Preset, seed: int, index: int, data: Prepared | None = None) -> Chain:
-    """Chain number `index` of a seed; how many drawings and passes it has depends on these two alone.
+    """Chain number `index` of a seed.
 
     Of a shape that the generator makes, or of a mesh from the training split of a data set.
     """
-    random = np.random.default_rng((seed, index))
-    views = 1 + int(random.choice(len(DRAWINGS), p=DRAWINGS))
-    length = 1 + int(random.choice(len(PASSES), p=PASSES))
+    views, length = plan_chain(seed, index)
     batch = training_samples(preset, seed, index, 1, views, data)
     chain = Chain(
         Sketches(batch.drawings[0], batch.packed_cameras[0]),
@@ -84,7 +106,8 @@ class ChainStage:
 
     Attributes:
         model: the network that is trained.
-        samples: how many shapes have been started.
+        forward: what is called for it in training (`Ranks.wrap`).
+        samples: how many shapes have been started, by all processes.
     """
 
     def __init__(
@@ -95,9 +118,10 @@ class ChainStage:
         samples: int,
         config: CompactConfig,
         data: Prepared | None = None,
+        ranks: Ranks = ALONE,
         under_way: Mapping[str, Tensor] | None = None,
     ) -> None:
-        """Starts the threads that make chains, and the first ones.
+        """Starts the threads that make chains.
 
         Args:
             preset: constants.
@@ -106,49 +130,56 @@ class ChainStage:
             samples: how many shapes were started before.
             config: of the network.
             data: data set of meshes; None for the preset's grammar.
-            under_way: what `under_way` said when the run was left, to go on with the same chains. If it is of another
-                number of chains than the preset's batch, new ones are started.
+            ranks: the processes that train together.
+            under_way: what `under_way` said when the run was left, to go on with the same chains. New ones are started
+                where several processes train, or it is of another number of chains than the preset's batch.
         """
         self.model = place(CompactNet(config), device)
+        self.forward: nn.Module = self.model
         self._device, self._grammar, self._data = device, preset.grammar, data
         self._loss = distance_loss if preset.truth == "distance" else occupancy_loss
         self.samples = 0
-        self._chains = Ahead(partial(start_chain, preset, seed, data=data), samples, 2 * preset.batch, preset.threads)
-        if under_way and len(under_way["index"]) == preset.batch:
-            self._batch = [
-                replace(start_chain(preset, seed, int(index), data), depth=int(depth), prior=prior.numpy())
-                for index, depth, prior in zip(*(under_way[name] for name in CHAINS), strict=True)
-            ]
-        else:
-            self._batch = [self._next() for _ in range(preset.batch)]
+        self._slots = range(ranks.rank * preset.batch, (ranks.rank + 1) * preset.batch)
+        self._alone = ranks.world == 1
+        self._batch: dict[int, Chain] = {}
+        if self._alone and under_way and len(under_way["index"]) == preset.batch:
+            for slot, index, depth, prior in zip(self._slots, *(under_way[name] for name in CHAINS), strict=True):
+                chain = start_chain(preset, seed, int(index), data)
+                self._batch[slot] = replace(chain, depth=int(depth), prior=prior.numpy())
+        left = [c.length - c.depth for c in self._batch.values()] or [0] * (ranks.world * preset.batch)
+        self._plan, ahead = (plan_batches(seed, samples, left) for _ in range(2))
+        mine = (index for starts in ahead for slot, index in starts if slot in self._slots)
+        make = partial(start_chain, preset, seed, data=data)
+        self._chains = Ahead(make, mine, 2 * preset.batch, ranks.threads(preset.threads))
 
     @property
     def waited(self) -> float:
         """Seconds that were spent waiting for chains."""
         return self._chains.waited
 
-    def _next(self) -> Chain:
-        self.samples += 1
-        return next(self._chains)
-
     def step(self) -> Tensor:
         """One pass of every chain; returns the loss."""
-        for i, chain in enumerate(self._batch):
-            if chain.depth >= chain.length:
-                self._batch[i] = self._next()
-        truth = torch.from_numpy(np.stack([c.truth for c in self._batch])).to(self._device)
+        starts = next(self._plan)
+        self.samples += len(starts)
+        for slot, _ in starts:
+            if slot in self._slots:
+                self._batch[slot] = next(self._chains)
+        chains = list(self._batch.values())
+        truth = torch.from_numpy(np.stack([c.truth for c in chains])).to(self._device)
         with autocast(self._device):
-            logits = self.model(**compact_inputs(self._batch, self._device))
+            logits = self.forward(**compact_inputs(chains, self._device))
         loss = self._loss(logits, truth)
         predictions = logits.detach().float().sigmoid().cpu().numpy()
-        for chain, prediction in zip(self._batch, predictions, strict=True):
+        for chain, prediction in zip(chains, predictions, strict=True):
             chain.prior = prediction
             chain.depth += 1
         return loss
 
     def under_way(self) -> dict[str, Tensor]:
-        """The chains of the batch: what it takes to go on with them as if nothing had happened."""
-        chains = self._batch
+        """The chains of the batch: what it takes to go on with them; nothing where several processes train."""
+        chains = list(self._batch.values())
+        if not chains or not self._alone:
+            return {}
         columns = [c.index for c in chains], [c.depth for c in chains], np.stack([c.prior for c in chains])
         return {name: torch.as_tensor(column) for name, column in zip(CHAINS, columns, strict=True)}
 

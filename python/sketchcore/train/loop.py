@@ -10,21 +10,19 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import torch
-from rich.console import Console
-from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
-from rich.progress import Progress as Bar
 from torch import Tensor, nn
 
 from sketchcore.atomic import sweep
 from sketchcore.datagen.prepared import Prepared
 from sketchcore.nets.compact import CompactConfig, CompactNet
 from sketchcore.nets.multiscale import MultiscaleNet
-from sketchcore.nets.precision import pick_device
 from sketchcore.nets.unet import PaperNet
 from sketchcore.nets.weights import save_weights
+from sketchcore.train.bar import TrainingBar
 from sketchcore.train.beginning import read_beginning
 from sketchcore.train.chains import ChainStage
 from sketchcore.train.checkpoint import Checkpoint, Progress, load_checkpoint, save_checkpoint
+from sketchcore.train.distributed import Ranks, joined
 from sketchcore.train.optimizers import make_optimizers
 from sketchcore.train.papertrain import SingleStage, UpdaterStage
 from sketchcore.train.presets import PRESETS, Preset
@@ -33,8 +31,14 @@ Network = CompactNet | PaperNet | MultiscaleNet
 
 
 class Stage(Protocol):
-    """One network's training: makes its own samples."""
+    """One network's training: makes its own samples.
 
+    Attributes:
+        forward: what is called for the network in training (`Ranks.wrap`).
+        samples: how many shapes have been seen, by all processes.
+    """
+
+    forward: nn.Module
     samples: int
 
     @property
@@ -139,6 +143,8 @@ class Run:
 def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]:
     """Trains a preset's networks and writes `weights.safetensors` with its config beside it.
 
+    Started by `torchrun`, several processes train together (`distributed.py`); the first one writes.
+
     Args:
         run: what to train.
         resume: go on from the checkpoints in `run.out`.
@@ -153,6 +159,11 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
         ValueError: for a run, a checkpoint or weights to begin with that make no sense.
         FloatingPointError: if the loss is no longer finite; the last checkpoint stands.
     """
+    with joined(run.device) as (ranks, device):
+        return _train(run, resume, quiet or not ranks.first, ranks, device)
+
+
+def _train(run: Run, resume: bool, quiet: bool, ranks: Ranks, device: torch.device) -> list[Progress]:
     if resume and run.begin is not None:
         raise ValueError("a resumed run goes on from its checkpoint; leave out the weights to begin with")
     beginning = None if run.begin is None else read_beginning(run.begin, run.constants)
@@ -161,18 +172,22 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
     run.out.mkdir(parents=True, exist_ok=True)
     stages = run.constants.stages
     checkpoints = {name: run.out / f"{name}.checkpoint.safetensors" for name in stages}
-    existing = [path for path in checkpoints.values() if path.exists()]
+    exists = {name: bool(ranks.told(path.exists())) for name, path in checkpoints.items()}
+    existing = [checkpoints[name] for name in stages if exists[name]]
     if existing and not resume:
         raise FileExistsError(f"{existing[0]} exists; go on from it with --resume, or name another folder")
     if resume and not existing:
         raise FileNotFoundError(f"no checkpoint in {run.out}; start without --resume")
-    for path in (*checkpoints.values(), run.out / "weights.safetensors", run.out / "weights.json"):
-        sweep(path)
-    device = pick_device(run.device)
+    if ranks.first:
+        for path in (*checkpoints.values(), run.out / "weights.safetensors", run.out / "weights.json"):
+            sweep(path)
     trained: dict[str, Network] = {}
     results = []
     for index, name in enumerate(stages):
-        found = load_checkpoint(checkpoints[name]) if checkpoints[name].exists() else None
+        found = None
+        if exists[name]:
+            with ranks.file(checkpoints[name]) as file:
+                found = load_checkpoint(file)
         if found and found.task != task:
             learnt, asked = (", ".join(t.values()) for t in (found.task, task))
             raise ValueError(
@@ -180,18 +195,19 @@ def train(run: Run, resume: bool = False, quiet: bool = False) -> list[Progress]
                 "resume it with its own preset, grammar and data, or name another folder"
             )
         # A later stage that has begun shows that this one is done.
-        begun = any(checkpoints[later].exists() for later in stages[index + 1 :])
+        begun = any(exists[later] for later in stages[index + 1 :])
         progress = found.progress if found else Progress(name, began=beginning.record if beginning else None)
-        stage = _stage(run, progress, device, trained, data, found)
+        stage = _stage(run, progress, device, trained, data, ranks, found)
         try:
             if beginning and name in beginning.states:
                 _fill(stage.model, beginning.states[name])
-            loop = _Loop(run, stage, found, progress, checkpoints[name], task)
+            loop = _Loop(run, stage, found, progress, checkpoints[name], task, ranks)
             results.append(loop.progress if begun else loop.go(share=1 / len(stages), quiet=quiet))
         finally:
             stage.close()
         trained[name] = loop.average
-        _save_weights(run, trained, results, data)
+        if ranks.first:
+            _save_weights(run, trained, results, data, ranks)
     return results
 
 
@@ -201,6 +217,7 @@ def _stage(
     device: torch.device,
     trained: dict[str, Network],
     data: Prepared | None,
+    ranks: Ranks,
     found: Checkpoint | None,
 ) -> Stage:
     torch.manual_seed(run.seed)
@@ -208,13 +225,13 @@ def _stage(
     constants, options = run.constants, run.options or (progress.began or {}).get("options", {})
     if name == "compact":
         config, under_way = CompactConfig.of_options(options), found.under_way if found else None
-        return ChainStage(constants, run.seed, device, samples, config, data, under_way)
+        return ChainStage(constants, run.seed, device, samples, config, data, ranks, under_way)
     if name == "updater":
         single = trained["single"]
         assert isinstance(single, PaperNet)
-        return UpdaterStage(constants, run.seed, device, samples, single, data)
+        return UpdaterStage(constants, run.seed, device, samples, single, data, ranks)
     net = PaperNet(**options) if name == "single" else MultiscaleNet(**options)
-    return SingleStage(constants, run.seed, device, samples, net, data)
+    return SingleStage(constants, run.seed, device, samples, net, data, ranks)
 
 
 def _fill(net: Network, state: dict[str, Tensor]) -> None:
@@ -235,13 +252,15 @@ class _Loop:
         progress: Progress,
         path: Path,
         task: dict[str, str],
+        ranks: Ranks,
     ) -> None:
-        self.run, self.stage, self.path, self.task = run, stage, path, task
+        self.run, self.stage, self.path, self.task, self.ranks = run, stage, path, task, ranks
         self.constants = run.constants
         self.progress = progress
         c = self.constants
         if found:
             stage.model.load_state_dict(found.model)
+        stage.forward = ranks.wrap(stage.model)
         self.optimizers = make_optimizers(stage.model, c)
         self.rates = [optimizer.param_groups[0]["lr"] for optimizer in self.optimizers]
         self.average: Network = stage.model
@@ -252,7 +271,7 @@ class _Loop:
                 self.average.load_state_dict(found.average)
             for number, optimizer in enumerate(self.optimizers):
                 optimizer.load_state_dict({**optimizer.state_dict(), "state": found.moments.get(number, {})})
-            if found.random is not None:
+            if found.random is not None and ranks.world == 1:
                 torch.set_rng_state(found.random)
 
     def go(self, share: float, quiet: bool) -> Progress:
@@ -270,9 +289,9 @@ class _Loop:
             assert self.constants.minutes is not None
             return (before.seconds + seconds) / (60 * share * self.constants.minutes)
 
-        with _TrainingBar(before.stage, quiet) as bar:
+        with TrainingBar(before.stage, quiet) as bar:
             try:
-                while (part := done()) < 1:
+                while (part := self.ranks.told(done())) < 1:
                     loss = self._step(part)
                     now = time.monotonic()
                     self.progress.step += 1
@@ -280,7 +299,7 @@ class _Loop:
                     self.progress.seconds = before.seconds + now - started
                     self.progress.waited = before.waited + self.stage.waited - waited
                     bar.show(part, loss, self.progress)
-                    if now - evaluated > self.run.evaluate_every:
+                    if self.ranks.first and now - evaluated > self.run.evaluate_every:
                         self.progress.iou = self.stage.measure(self.average.eval())
                         bar.report(self.progress)
                         evaluated = time.monotonic()
@@ -290,9 +309,10 @@ class _Loop:
             except KeyboardInterrupt:
                 self._save()
                 raise
-            self.progress.iou = self.stage.measure(self.average.eval())
-            self._save()
-            bar.report(self.progress)
+            if self.ranks.first:
+                self.progress.iou = self.stage.measure(self.average.eval())
+                self._save()
+                bar.report(self.progress)
         return self.progress
 
     def _step(self, part: float) -> float:
@@ -307,7 +327,7 @@ class _Loop:
             optimizer.param_groups[0]["lr"] = share * rate
             optimizer.zero_grad()
         loss = self.stage.step()
-        value = float(loss.detach())
+        value = self.ranks.mean(float(loss.detach()))
         if not math.isfinite(value):
             raise FloatingPointError(f"the loss is {value} at step {self.progress.step}; try a lower rate")
         loss.backward()  # type: ignore[no-untyped-call]
@@ -322,6 +342,8 @@ class _Loop:
         return value
 
     def _save(self) -> None:
+        if not self.ranks.first:
+            return
         average = self.average.state_dict() if self.constants.average else {}
         moments = [optimizer.state_dict()["state"] for optimizer in self.optimizers]
         model, under_way = self.stage.model.state_dict(), self.stage.under_way()
@@ -338,7 +360,9 @@ def move_average(average: nn.Module, model: nn.Module, decay: float) -> None:
             mean.copy_(now)
 
 
-def _save_weights(run: Run, trained: dict[str, Network], results: list[Progress], data: Prepared | None) -> None:
+def _save_weights(
+    run: Run, trained: dict[str, Network], results: list[Progress], data: Prepared | None, ranks: Ranks
+) -> None:
     constants = run.constants
     several = len(constants.stages) > 1
     states = {f"{stage}." if several else "": net.state_dict() for stage, net in trained.items()}
@@ -351,45 +375,9 @@ def _save_weights(run: Run, trained: dict[str, Network], results: list[Progress]
             **asdict(constants),
             "generator": dict(constants.generator),
             **({} if data is None else {"data": {"name": data.folder.name, "fingerprint": data.fingerprint}}),
+            **({} if ranks.world == 1 else {"processes": ranks.world}),
             "runs": [asdict(progress) for progress in results],
         },
     }
     state = {prefix + name: tensor for prefix, part in states.items() for name, tensor in part.items()}
     save_weights(run.out / "weights.safetensors", state, config)
-
-
-class _TrainingBar:
-    """A progress bar with samples/s, waiting and held-out IoU, and a line for each measurement; nothing when quiet."""
-
-    def __init__(self, title: str, quiet: bool) -> None:
-        self._bar = Bar(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.percentage:3.0f} %  {task.fields[note]}"),
-            TimeRemainingColumn(),
-            console=Console(stderr=True, quiet=quiet),
-        )
-        self._task = self._bar.add_task(title, total=1.0, note="")
-        self._loss = float("nan")
-
-    def __enter__(self) -> _TrainingBar:
-        self._bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
-
-    def show(self, part: float, loss: float, progress: Progress) -> None:
-        """After a step: how far, the loss (smoothed), new shapes a second, the share of the time waited for them."""
-        self._loss = loss if math.isnan(self._loss) else 0.98 * self._loss + 0.02 * loss
-        iou = "..." if progress.iou is None else f"{progress.iou:.3f}"
-        note = f"loss {self._loss:.3f}  {progress.speed()}  held-out IoU {iou}"
-        self._bar.update(self._task, completed=part, note=note)
-
-    def report(self, progress: Progress) -> None:
-        """A line that stays, after a measurement."""
-        self._bar.console.print(
-            f"{progress.stage}: step {progress.step:,}, {progress.samples:,} samples, "
-            f"{progress.seconds / 60:.1f} minutes, {progress.speed()}, loss {self._loss:.3f}, "
-            f"held-out IoU {progress.iou:.3f}"
-        )

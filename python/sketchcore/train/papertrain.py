@@ -6,6 +6,7 @@ The multi-scale network is trained like the single view.
 from __future__ import annotations
 
 from functools import partial
+from itertools import count
 
 import numpy as np
 import torch
@@ -21,14 +22,17 @@ from sketchcore.nets.precision import autocast, place, unit
 from sketchcore.nets.singleview import SingleViewModel, SingleViewNet
 from sketchcore.nets.unet import PaperNet, paper_loss
 from sketchcore.train.ahead import Ahead
+from sketchcore.train.distributed import ALONE, Ranks
 from sketchcore.train.heldout import heldout_iou
 from sketchcore.train.presets import Preset
 from sketchcore.train.samples import training_samples
 from sketchcore.train.truth import in_camera_grids
 
 
-def _batches(preset: Preset, seed: int, first: int, views: int, data: Prepared | None) -> Ahead[Batch]:
-    return Ahead(partial(_batch, preset, seed, first, views, data), 0, 1, preset.threads)
+def _batches(preset: Preset, seed: int, first: int, views: int, data: Prepared | None, ranks: Ranks) -> Ahead[Batch]:
+    """This process's part of each of the batches that all processes make together."""
+    threads = ranks.threads(preset.threads)
+    return Ahead(partial(_batch, preset, seed, first, views, data), count(ranks.rank, ranks.world), 1, threads)
 
 
 def _batch(preset: Preset, seed: int, first: int, views: int, data: Prepared | None, number: int) -> Batch:
@@ -41,7 +45,8 @@ class SingleStage:
 
     Attributes:
         model: the network that is trained.
-        samples: how many shapes have been used.
+        forward: what is called for it in training (`Ranks.wrap`).
+        samples: how many shapes have been used, by all processes.
     """
 
     def __init__(
@@ -52,12 +57,14 @@ class SingleStage:
         samples: int,
         net: SingleViewNet,
         data: Prepared | None = None,
+        ranks: Ranks = ALONE,
     ) -> None:
         self.model = place(net, device)
+        self.forward: nn.Module = self.model
         self.samples = 0
         self._truth, self._grammar = preset.truth, preset.grammar
-        self._device, self._data = device, data
-        self._batches = _batches(preset, seed, samples, views=1, data=data)
+        self._device, self._data, self._ranks = device, data, ranks
+        self._batches = _batches(preset, seed, samples, views=1, data=data, ranks=ranks)
 
     @property
     def waited(self) -> float:
@@ -67,10 +74,10 @@ class SingleStage:
     def step(self) -> Tensor:
         """One batch; returns the loss."""
         batch = next(self._batches)
-        self.samples += len(batch.world)
+        self.samples += len(batch.world) * self._ranks.world
         drawing = unit(batch.drawings, self._device)
         with autocast(self._device):
-            logits = self.model(drawing)
+            logits = self.forward(drawing)
         return paper_loss(logits.float(), unit(in_camera_grids(self._truth, batch.frusta[:, 0]), self._device))
 
     def under_way(self) -> dict[str, Tensor]:
@@ -93,7 +100,8 @@ class UpdaterStage:
 
     Attributes:
         model: the network that is trained.
-        samples: how many shapes have been used.
+        forward: what is called for it in training (`Ranks.wrap`).
+        samples: how many shapes have been used, by all processes.
     """
 
     def __init__(
@@ -104,14 +112,16 @@ class UpdaterStage:
         samples: int,
         single: PaperNet,
         data: Prepared | None = None,
+        ranks: Ranks = ALONE,
     ) -> None:
         self.model = place(PaperNet(updater=True, width=single.width), device)
+        self.forward: nn.Module = self.model
         self.samples = 0
         self._truth, self._grammar = preset.truth, preset.grammar
         self._single = single
         self._predict = SingleViewModel(single, device).predict
-        self._device, self._data = device, data
-        self._batches = _batches(preset, seed, samples, views=2, data=data)
+        self._device, self._data, self._ranks = device, data, ranks
+        self._batches = _batches(preset, seed, samples, views=2, data=data, ranks=ranks)
 
     @property
     def waited(self) -> float:
@@ -121,11 +131,11 @@ class UpdaterStage:
     def step(self) -> Tensor:
         """One batch; returns the loss."""
         batch = next(self._batches)
-        self.samples += len(batch.world)
+        self.samples += len(batch.world) * self._ranks.world
         prior = torch.from_numpy(self._priors(batch)).to(self._device)
         drawing = unit(batch.drawings[:, 1:], self._device)
         with autocast(self._device):
-            logits = self.model(drawing, prior)
+            logits = self.forward(drawing, prior)
         return paper_loss(logits.float(), unit(in_camera_grids(self._truth, batch.frusta[:, 1]), self._device))
 
     def _priors(self, batch: Batch) -> NDArray[np.float32]:

@@ -1,0 +1,55 @@
+"""What a pass of the network costs for several objects at once: `python docs/serving/passes.py` prints a table.
+
+Processor time, the least of some runs, so that other work on the machine shows as little as it can.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import torch
+
+import sketchcore as sk
+from sketchcore.nets.models import CompactModel
+from sketchcore.nets.sketches import Sketches
+
+SIZES = (1, 2, 4, 8)
+RUNS = 15
+
+
+def main() -> None:
+    model = sk.load_model(device="cpu")
+    assert isinstance(model, CompactModel)
+    batch = sk.generate(0, max(SIZES), views=2)
+    objects = [Sketches(*pair) for pair in zip(batch.drawings, batch.packed_cameras, strict=True)]
+    evidence = model.net.evidence(objects)
+    readings = model.net.read(objects, evidence)
+    prior = model.net.decide(readings, None, [2] * len(objects))
+    threads = sorted({1, torch.get_num_threads()})
+    print(
+        "| objects in a pass | " + " | ".join(f"{n} thread{'s' * (n > 1)}: wall, CPU ms each" for n in threads) + " |"
+    )
+    print("|---" * (1 + len(threads)) + "|")
+    for size in SIZES:
+        cells = []
+        for count in threads:
+            torch.set_num_threads(count)
+            wall, cpu = least(lambda size=size: model.net.decide(readings[:size], prior[:size], [2] * size))
+            cells.append(f"{1000 * wall / size:.1f}, {1000 * cpu / size:.1f}")
+        print(f"| {size} | " + " | ".join(cells) + " |", flush=True)
+
+
+def least(job: Callable[[], object]) -> tuple[float, float]:
+    """The least seconds, of the clock and of the processor, of some runs."""
+    job()
+    found = []
+    for _ in range(RUNS):
+        wall, cpu = time.perf_counter(), time.process_time()
+        job()
+        found.append((time.perf_counter() - wall, time.process_time() - cpu))
+    return min(wall for wall, _ in found), min(cpu for _, cpu in found)
+
+
+if __name__ == "__main__":
+    main()
