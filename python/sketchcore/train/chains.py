@@ -70,8 +70,8 @@ def plan_chain(seed: int, index: int) -> tuple[int, int]:
 def plan_batches(seed: int, first: int, left: Sequence[int]) -> Iterator[list[tuple[int, int]]]:
     """For each step, the slots of a batch in which a chain starts, and the chains' numbers: `first` and on.
 
-    `left` has the passes that are left of the chain in each slot, 0 where there is none. So processes that share a batch
-    know which chains are whose, and need not ask each other.
+    `left` has the passes that are left of the chain in each slot, 0 where there is none. So processes that share a
+    batch know which chains are whose, and need not ask each other.
     """
     numbers, left = count(first), list(left)
     while True:
