@@ -184,9 +184,9 @@ def test_a_look_along_x_answers_in_the_world_as_it_is() -> None:
 def test_both_directions_along_x_weigh_the_same() -> None:
     model = CompactModel(awake(CompactNet(TINY)), CPU)
     sketches = chains((1,))[0].sketches
-    said = iter([0.1, 0.2, 0.4, 0.5, 0.3])
+    said = iter([0.1, 0.2, 0.4, 0.5, 0.6])
     model.net.decide = lambda *_: torch.full((1, 32, 32, 16, 8), next(said))  # type: ignore[method-assign]
-    means = [0.1, (0.1 + 0.2) / 2, (0.1 + 0.3) / 2, (0.3 + 0.3) / 2, (0.4 + 0.3) / 2]
+    means = [0.1, (0.1 + 0.2) / 2, (0.1 + 0.3) / 2, (0.3 + 0.3) / 2, ((0.1 + 0.5 + 0.6) / 3 + 0.3) / 2]
     for mean, volume in zip(means, model.rounds(sketches, 4), strict=True):
         expected = heed_outlines(np.full((64, 64, 64), mean, np.float32), sketches)
         np.testing.assert_allclose(volume, join_pieces(expected), rtol=1e-5)

@@ -74,7 +74,7 @@ class CompactModel:
     Mirrored, a world is seen by mirrored cameras in drawings flipped left to right. That describes the same object
     as well: about z = 0 because it is symmetric, along x because a mirrored object is an object too. The network
     answers each of the four descriptions a little differently, above all those that are mirrored along x from those
-    that are not; the volume is the mean of its latest answers, in which both kinds weigh the same, and each next
+    that are not; the volume is the mean of all its answers, in which both kinds weigh the same, and each next
     round's prior. What is handed out has every outline filled (`outlines.py`), and its pieces joined
     (`pieces.py`).
     """
@@ -109,7 +109,7 @@ class CompactModel:
         return seen
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
-        answers: dict[tuple[int, ...], Tensor] = {}
+        said: tuple[list[Tensor], list[Tensor]] = [], []  # of the world as it is, and mirrored along x
         known: Tensor | None = None
         if start is not None:
             half = 0.5 * (start + start[:, :, ::-1])[:, :, 32:]
@@ -125,17 +125,11 @@ class CompactModel:
             prior = None if mean is None else turn(mean)
             if prior is not None:
                 answer = turn(self.net.decide(readings[look], prior, [len(sketches)]))
-            answers[look] = answer
-            mean = _balanced(answers)
+            said[0 in look].append(answer)
+            mean = torch.stack([torch.stack(kind).mean(dim=0) for kind in said if kind]).mean(dim=0)
             if known is not None:  # one prediction among those of the drawings
-                mean = (known + len(answers) * mean) / (1 + len(answers))
+                mean = (known + (number + 1) * mean) / (number + 2)
             yield join_pieces(heed_outlines(whole(mean), sketches))
-
-
-def _balanced(answers: dict[tuple[int, ...], Tensor]) -> Tensor:
-    """The mean of answers, in which those mirrored along x weigh as much as the others."""
-    kinds = [[answer for look, answer in answers.items() if (0 in look) == mirrored] for mirrored in (False, True)]
-    return torch.stack([torch.stack(kind).mean(dim=0) for kind in kinds if kind]).mean(dim=0)
 
 
 def _as_it_is(cells: Tensor) -> Tensor:
