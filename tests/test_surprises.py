@@ -105,7 +105,7 @@ def test_no_code_of_the_package_unpickles() -> None:
                     ast.Attribute(value=ast.Name(id="torch"), attr="load") | ast.Call(func=ast.Name(id="eval" | "exec"))
                 ):
                     found.append(f"{path.name}:{node.lineno}")
-                case ast.keyword(arg="allow_pickle", value=value) if not ast.unparse(value) == "False":
+                case ast.keyword(arg="allow_pickle", value=value) if ast.unparse(value) != "False":
                     found.append(f"{path.name}:{node.value.lineno}")
     assert found == []
 
