@@ -123,10 +123,8 @@ proptest! {
         let grid = solid::voxelize(&vertices, &faces);
         let surface = Surface::new(&vertices, &faces, (degrees * 90.0).clamp(0.0, 90.0));
         prop_assert_eq!(grid.is_err(), surface.is_err());
-        if let Ok(surface) = surface {
-            if let Ok(seen) = Buffers::of_mesh(&surface, &camera, 24) {
-                check(&seen);
-            }
+        if let Ok(seen) = surface.map(|surface| Buffers::of_mesh(&surface, &camera, 24)) {
+            seen.iter().for_each(check);
         }
         prop_assert!(Surface::new(&vertices, &faces, f64::NAN).is_err());
     }
