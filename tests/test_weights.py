@@ -6,6 +6,8 @@ import json
 import os
 import pickle
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -163,3 +165,10 @@ def test_wrong_arguments_are_named(tmp_path: Path, state: dict[str, Tensor]) -> 
     with pytest.raises(ValueError, match="JSON"):
         save_weights(tmp_path / "net.safetensors", state, {"rate": float("nan")})
     assert not list(tmp_path.iterdir())
+
+
+def test_loading_the_weights_imports_no_compiler() -> None:
+    """It takes two seconds to import, and arithmetic on tensors without memory would do so."""
+    code = "import sys, sketchcore; sketchcore.load_model(); print('torch._dynamo' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"

@@ -49,7 +49,7 @@ class Attention(nn.Module):
             raise ValueError(f"a width of {width} cannot be shared by {heads} attention heads")
         self.heads = heads
         self.norm = nn.LayerNorm(width)
-        self.place = nn.Parameter(0.02 * torch.randn(1, cells, width))
+        self.place = nn.Parameter(nn.init.normal_(torch.empty(1, cells, width), std=0.02))
         self.into = nn.Linear(width, 3 * width)
         self.out = nn.Linear(width, width)
         nn.init.zeros_(self.out.weight)

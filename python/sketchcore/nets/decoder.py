@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
@@ -44,8 +45,9 @@ class WorldDecoder(nn.Module):
         self.shortcut = nn.Conv3d(inputs, 8, 1)
         nn.init.zeros_(self.shortcut.weight)
         nn.init.constant_(self.out.bias, -2.0)  # type: ignore[arg-type]
-        axes = [(torch.arange(n) + 0.5) / COARSE[0] - (0.5 if n == COARSE[0] else 0.0) for n in COARSE]
-        self.register_buffer("place", torch.stack(torch.meshgrid(*axes, indexing="ij"), dim=-1), persistent=False)
+        axes = [(np.arange(n) + 0.5) / COARSE[0] - (0.5 if n == COARSE[0] else 0.0) for n in COARSE]
+        place = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).astype(np.float32)
+        self.register_buffer("place", torch.from_numpy(place), persistent=False)
 
     def forward(self, readings: Tensor, evidence: Tensor, prior: Tensor, condition: Tensor) -> Tensor:
         """Decides on every voxel.

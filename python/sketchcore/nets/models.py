@@ -240,8 +240,6 @@ class _Unfilled(TorchFunctionMode):
     def __torch_function__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
         if func in _FILLS or getattr(func, "__module__", None) == "torch.nn.init":
             return args[0] if args else kwargs["tensor"]
-        if func is torch.randn:  # without memory at all it would import a second of torch
-            func = torch.empty
         return func(*args, **(kwargs or {}))
 
 
