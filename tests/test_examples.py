@@ -1,11 +1,13 @@
 """The pages of the guide: their Python runs, their command lines are understood, and the reference is whole."""
 
+import asyncio
 import os
 import re
 import shlex
 import shutil
 from pathlib import Path
 
+import httpx
 import numpy as np
 import pytest
 import torch
@@ -15,6 +17,7 @@ from sybil.parsers.markdown import PythonCodeBlockParser
 
 import sketchcore as sk
 from sketchcore.cli import app
+from sketchcore.serve.api import build_app
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "weights" / "README.md"]
@@ -48,12 +51,28 @@ def _namespace():
     }
 
 
+def _post(url, **request):
+    """A request to the server that a page takes for granted: to one in this process."""
+    assert url.startswith("http://127.0.0.1:8021/")
+    app = build_app(sk.load_model())
+
+    async def asked():
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(app)) as client:
+            return await client.post(url, **request)
+
+    try:
+        return asyncio.run(asked())
+    finally:
+        app.state.service.close()
+
+
 @pytest.mark.parametrize("page", CODE, ids=lambda page: str(page.relative_to(ROOT)))
 def test_the_python_of_a_page_runs(page, tmp_path, monkeypatch):
     for folder in ("examples", "weights"):
         os.symlink(ROOT / folder, tmp_path / folder)
     shutil.copy(ROOT / "examples" / "chair.png", tmp_path / "drawing.png")
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("httpx.post", _post)
     examples = Sybil(parsers=[PythonCodeBlockParser()]).parse(page)
     examples.namespace.update(_namespace())
     count = 0
