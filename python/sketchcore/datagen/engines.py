@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
-import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
 from types import MappingProxyType
 
 from sketchcore.datagen.manifest import Shard
+from sketchcore.datagen.processes import process_pool
 
 Make = Callable[[int], Shard]
 """Makes the shard of a number, and says what it made."""
@@ -30,8 +29,7 @@ def in_processes(make: Make, numbers: Sequence[int], workers: int | None) -> Ite
     """
     count = min(workers or os.cpu_count() or 1, max(len(numbers), 1))
     waiting: set[Future[Shard]] = set()
-    # Rust's threads do not survive a fork.
-    pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _follow)
+    pool = process_pool(count)
     try:
         for number in numbers:
             waiting.add(pool.submit(make, number))
@@ -43,18 +41,6 @@ def in_processes(make: Make, numbers: Sequence[int], workers: int | None) -> Ite
         raise RuntimeError("a process that made shards died; the same command goes on with what is missing") from None
     finally:
         pool.shutdown(cancel_futures=True)
-
-
-def _follow() -> None:
-    """In a worker: ends it when the process that started it is killed; it would wait for work forever."""
-    parent = multiprocessing.parent_process()
-
-    def end() -> None:
-        if parent is not None:
-            parent.join()
-            os._exit(1)
-
-    threading.Thread(target=end, daemon=True).start()
 
 
 def on_ray(make: Make, numbers: Sequence[int], workers: int | None) -> Iterator[Shard]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import multiprocessing
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -24,6 +23,7 @@ import numpy as np
 from sketchcore.atomic import write_atomically
 from sketchcore.datagen.cleaning import LeftOutError, place
 from sketchcore.datagen.prepared import INDEX, OBJECTS, SPLITS, VERSION, MeshObject, load_found, save_object
+from sketchcore.datagen.processes import process_pool
 from sketchcore.datagen.upright import AXES, CUSTOM, FIXED, check_axis, elect, standing
 from sketchcore.meshfile import READ_SUFFIXES, load_mesh
 
@@ -309,8 +309,7 @@ class _Workers:
 
     def _submit(self, work: Callable[[Any], Any], task: object) -> Future[Any]:
         if self._pool is None:
-            # Rust's threads do not survive a fork.
-            self._pool = ProcessPoolExecutor(self._count, mp_context=multiprocessing.get_context("spawn"))
+            self._pool = process_pool(self._count)
         return self._pool.submit(work, task)
 
     def each(self, work: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[tuple[int, Any]]:
