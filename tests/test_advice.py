@@ -90,6 +90,9 @@ class Carver:
     def in_place(self, sketches: Sketches, always: bool = False) -> Sketches:
         return sketches
 
+    def first(self, drawings: int) -> float:
+        return 3.5
+
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         yield from self.first_predictions([sketches])
 

@@ -45,6 +45,9 @@ class Oracle:
     def in_place(self, sketches: Sketches, always: bool = False) -> Sketches:
         return sketches
 
+    def first(self, drawings: int) -> float:
+        return 3.5
+
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         blank = np.full((64, 64, 64), 0.1, np.float32)
         return update_rounds(
@@ -88,6 +91,9 @@ class Carver:
 
     def in_place(self, sketches: Sketches, always: bool = False) -> Sketches:
         return sketches
+
+    def first(self, drawings: int) -> float:
+        return 3.5
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         yield from self.first_predictions([sketches])  # nothing changes afterwards: it stops at once

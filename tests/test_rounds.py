@@ -42,6 +42,9 @@ class Oracle:
     def in_place(self, sketches: Sketches, always: bool = False) -> Sketches:
         return sketches
 
+    def first(self, drawings: int) -> float:
+        return 3.5
+
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         return update_rounds(lambda view, prior: self.answer(sketches, view), sketches.cameras, iterations, start)
 

@@ -53,6 +53,9 @@ class _NoModel:
     def in_place(self, sketches: Any, always: bool = False) -> Any:
         return sketches
 
+    def first(self, drawings: int) -> float:
+        return 3.5
+
 
 _APP, _SERVER = _app()
 _LOOP = asyncio.new_event_loop()

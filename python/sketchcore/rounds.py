@@ -13,7 +13,7 @@ Volume = NDArray[np.float32]
 TOLERANCE = 0.02
 """Rounds end when the next is expected to move fewer voxels than this share of the solid's to the other side."""
 FIRST = 3.5
-"""How much more than its second round the shipped network's first one moves; a later one, about as much as the next."""
+"""How much more than its second round a network's first one moves; a later one, about as much as the next."""
 
 Predict = Callable[[int, Volume | None], Volume]
 
@@ -53,17 +53,18 @@ def visit(predict: Predict, cameras: NDArray[np.float64], view: int, volume: Vol
     return into
 
 
-def until_settled(volumes: Iterator[Volume], tolerance: float = TOLERANCE) -> Iterator[Volume]:
+def until_settled(volumes: Iterator[Volume], tolerance: float = TOLERANCE, first: float = FIRST) -> Iterator[Volume]:
     """The volumes of rounds up to the one after which the next would change next to nothing.
 
     Args:
         volumes: the first prediction, then each round's.
         tolerance: the least share of the occupied voxels (`crossing`) that a round is worth running for; 0 for all.
+        first: the first round may move so many times that share (`Model.first`).
     """
     before: Volume | None = None
     for number, volume in enumerate(volumes):
         yield volume
-        if before is not None and crossing(before, volume) < tolerance * (FIRST if number == 1 else 1):
+        if before is not None and crossing(before, volume) < tolerance * (first if number == 1 else 1):
             return
         before = volume
 

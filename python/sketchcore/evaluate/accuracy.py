@@ -120,7 +120,7 @@ def measure_accuracy(
 def settled(model: Model, drawings: NDArray[np.uint8], cameras: Sequence[Camera]) -> Volume:
     """The solid of drawings, uint8 [n, 256, 256], as `reconstruct` makes it: in their places, until it has settled."""
     sketches = model.in_place(Sketches(drawings, pack_cameras(cameras)))
-    *_, volume = until_settled(model.rounds(sketches, ROUNDS))
+    *_, volume = until_settled(model.rounds(sketches, ROUNDS), first=model.first(len(sketches)))
     return volume
 
 
@@ -132,7 +132,7 @@ def predictions(
     Where rounds end early, because the solid has settled, their last volume stands for those that were saved.
     """
     sketches = model.in_place(Sketches(example.drawings[:views], pack_cameras(example.cameras[:views])))
-    made = list(until_settled(model.rounds(sketches, rounds), tolerance))
+    made = list(until_settled(model.rounds(sketches, rounds), tolerance, model.first(views)))
     return made + [made[-1]] * (rounds + 1 - len(made))
 
 

@@ -12,7 +12,7 @@ from sketchcore.nets.multiscale import MultiscaleNet
 from sketchcore.nets.precision import autocast, place, unit
 from sketchcore.nets.sketches import Sketches
 from sketchcore.nets.unet import PaperNet
-from sketchcore.rounds import Volume, visit
+from sketchcore.rounds import FIRST, Volume, visit
 
 SingleViewNet = PaperNet | MultiscaleNet
 """A drawing in, its camera grid out: [B, 1, 256, 256] -> logits [B, 2, 64, 64, 64]."""
@@ -34,6 +34,9 @@ class SingleViewModel:
 
     def in_place(self, sketches: Sketches, always: bool = False) -> Sketches:
         return sketches
+
+    def first(self, drawings: int) -> float:
+        return FIRST
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
         """Yields the same float32 [64, 64, 64] (x, y, z) for the first prediction and each round.
