@@ -144,7 +144,7 @@ def test_what_is_wrong_is_said(change: Callable[[dict[str, bytes]], object], mes
 
 @pytest.mark.parametrize("data", [b"", b"PK", b"hello" * 100, b"PK\x05\x06" + bytes(18)])
 def test_what_is_no_zip_is_refused(data: bytes) -> None:
-    with pytest.raises(ValueError, match="no session file"):
+    with pytest.raises(ValueError, match="not a session file"):
         read_session(data)
 
 
