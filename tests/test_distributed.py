@@ -26,7 +26,7 @@ from sketchcore.train.papertrain import _batches
 TINY = {"stem": 8, "image": (16, 16, 16), "features": 8, "fused": 8, "world": (8, 16, 16), "groups": 2}
 
 RANK = """
-import json, os, sys
+import gc, json, os, sys
 from pathlib import Path
 import torch
 from sketchcore.train import Run, chains, papertrain, train
@@ -51,6 +51,8 @@ for task in tasks:
     said = {"losses": losses, "steps": [p.step for p in progress], "samples": [p.samples for p in progress]}
     (out / f"{task['name']}.{rank}.json").write_text(json.dumps(said))
     losses = []
+torch.distributed.barrier()
+gc.collect()
 torch.distributed.destroy_process_group()
 """
 

@@ -7,6 +7,7 @@ have the same weights after every step. What is written, printed and measured is
 
 from __future__ import annotations
 
+import gc
 import os
 import tempfile
 from collections.abc import Iterator
@@ -131,6 +132,9 @@ def joined(device: str | None) -> Iterator[tuple[Ranks, torch.device]]:
         dist.init_process_group("cpu:gloo,cuda:nccl" if chosen.type == "cuda" else "gloo")
     try:
         yield Ranks(dist.get_rank(), world, here), chosen
+        if ours:
+            dist.barrier()  # nobody leaves while others still talk
     finally:
         if ours:
+            gc.collect()  # what holds on to the group would take its threads along when the process ends
             dist.destroy_process_group()
