@@ -117,7 +117,7 @@ def test_evaluate_reports_as_json_and_plots(tmp_path: Path) -> None:
 def test_every_part_on_the_test_set_has_a_table_and_a_plot(
     part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    few = {name: robustness.STRENGTHS[name] for name in ("width", "shift")}
+    few = {name: robustness.STRENGTHS[name] for name in ("width", "gaps")}
     monkeypatch.setattr(robustness, "STRENGTHS", few)
     assert "fixed test set" in run("evaluate", part, "--shapes", 1, "-o", tmp_path)
     with Image.open(tmp_path / f"{part}.png") as image:
