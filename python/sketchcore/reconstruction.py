@@ -174,8 +174,8 @@ def reconstruct(
             where its solid fills the outline poorly.
         iterations: rounds over all drawings, 0 or more; fewer are run where the solid has settled.
         tolerance: what that means: they stop after a round that moved fewer voxels to the other side of 0.5 than
-            this share of those that are occupied; the first round, which moves most, may move 6 times as many with
-            one drawing, and 12 times with several. At 0 they never stop early.
+            this share of those that are occupied; the first round, which moves most, may move 3.5 times as many
+            with one drawing, and 12 times with several. At 0 they never stop early.
         align: True looks for the place, size and camera at which each drawing is the most plausible one of an object
             that is centred in the world, with a largest side of 1/1.2, and takes it so: drawings made by hand are off
             centre, too small or too large, and made from a few degrees beside their viewpoint. The result's `views`

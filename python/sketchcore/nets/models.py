@@ -105,7 +105,7 @@ class CompactModel:
 
     def first(self, drawings: int) -> float:
         # Further rounds mend what one drawing leaves open; they mend nothing that several say (docs/training.md).
-        return 6.0 if drawings == 1 else 12.0
+        return FIRST if drawings == 1 else 12.0
 
     def _look(self, sketches: Sketches) -> tuple[Tensor, Tensor, Tensor]:
         """The evidence of drawings, what is read in them, and what it says by itself."""
