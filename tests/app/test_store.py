@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -155,6 +156,75 @@ def test_a_damaged_history_costs_undo_and_no_drawing(tmp_path: Path, damage: str
     assert last.document == found.document
     for _ in range(undone + 1):
         assert last.undo()
+
+
+@pytest.mark.parametrize("torn", [False, True])
+def test_a_kill_between_a_session_and_its_history_costs_no_step(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, torn: bool
+) -> None:
+    store = Store(tmp_path)
+    session = store.create()
+    draw(session, 10)
+    store.save(session)
+
+    class Killed(BaseException):
+        pass
+
+    def killed(path: Path, lines: list[str]) -> None:
+        if torn:
+            path.write_bytes(path.read_bytes() + lines[0].encode()[:20])
+        raise Killed
+
+    monkeypatch.setattr("sketchcore.app.store._append", killed)
+    for y in (20, 30):
+        draw(session, y)
+    with pytest.raises(Killed):
+        store.save(session)  # two steps at once
+    monkeypatch.undo()
+    again = Store(tmp_path)
+    found = again.get(session.id)
+    assert found.document == session.document
+    assert sum(found.undo() for _ in range(10)) == 3
+    again.save(found)
+    last = Store(tmp_path).get(session.id)
+    assert sum(last.redo() for _ in range(10)) == 3
+
+
+def test_a_session_of_before_is_read(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    session = store.create()
+    draw(session)
+    store.save(session)
+    path = tmp_path / session.id / "session.json"
+    record = json.loads(path.read_text())
+    del record["since"]
+    path.write_text(json.dumps(record))
+    found = Store(tmp_path).get(session.id)
+    assert found.document == session.document
+    assert found.undo()
+
+
+@pytest.mark.parametrize(
+    "since",
+    [
+        3,
+        {},
+        {"after": -1, "lines": []},
+        {"after": 10**9, "lines": []},
+        {"after": 0, "lines": [3]},
+        {"after": True, "lines": []},
+    ],
+)
+def test_steps_that_make_no_sense_cost_undo_and_no_drawing(tmp_path: Path, since: object) -> None:
+    store = Store(tmp_path)
+    session = store.create()
+    draw(session)
+    store.save(session)
+    path = tmp_path / session.id / "session.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"since": since}))
+    found = Store(tmp_path).get(session.id)
+    assert found.document == session.document
+    assert not found.undo()
 
 
 def test_a_damaged_session_says_so(tmp_path: Path) -> None:

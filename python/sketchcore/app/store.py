@@ -1,6 +1,7 @@
 """Sessions on disk: kept after every change, and found again after whatever happened.
 
-FOLDER/ID/session.json          what `sessionfile.describe` says, and the revision; replaced whole
+FOLDER/ID/session.json          what `sessionfile.describe` says, the revision, and the steps since; replaced whole
+FOLDER/ID/history.jsonl         what can be undone (`history`), a line a step; the steps since are added after that
 FOLDER/ID/volumes/KEY.npy.gz      one a solid, written once, before the session that names it
 """
 
@@ -17,14 +18,14 @@ import threading
 import weakref
 import zlib
 from collections import OrderedDict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from sketchcore.app.document import Document
+from sketchcore.app.document import Document, fields
 from sketchcore.app.history import History
 from sketchcore.app.session import Session
 from sketchcore.app.sessionfile import describe, parse_volume, read_session, recall, write_session
@@ -158,9 +159,12 @@ class Store:
         kept = session.kept()
         for key, volume in kept.volumes.items():
             _write_volume(place / "volumes" / f"{key}.npy.gz", volume)
-        record = {"revision": kept.revision, **describe(kept)}
+        history = place / "history.jsonl"
+        anew = _begins(kept.news) or not history.exists()
+        since = {"after": 0 if anew else history.stat().st_size, "lines": kept.news}
+        record = {"revision": kept.revision, "since": since, **describe(kept)}
         write_atomically(place / "session.json", json.dumps(record, allow_nan=False).encode())
-        _append(place / "history.jsonl", kept.news)
+        _append(history, kept.news)
         session.told(len(kept.news))
         for file in (place / "volumes").iterdir():
             if file.name.startswith(".") or file.name.split(".")[0] not in kept.volumes:
@@ -202,9 +206,10 @@ class Store:
         revision = record.pop("revision", None)
         if type(revision) is not int:
             raise ValueError(f"the session {place.name} is damaged: it has no revision")
+        since = record.pop("since", None)  # sessions of before have none
         document, solid, made_of = recall(record)
         history = _read_history(
-            place / "history.jsonl", document, {path.name for path in (place / "volumes").iterdir()}
+            place / "history.jsonl", since, document, {path.name for path in (place / "volumes").iterdir()}
         )
         keys = {part.volume for one in history.documents() for part in one.parts}
         if solid is not None:
@@ -213,10 +218,19 @@ class Store:
         return Session(place.name, history, volumes, solid, made_of, revision)
 
 
+def _begins(lines: Sequence[str]) -> bool:
+    """Whether lines are a whole history, and not the end of one."""
+    return bool(lines) and lines[0].startswith('{"begin"')
+
+
+def _text(lines: Iterable[str]) -> bytes:
+    return "".join(f"{line}\n" for line in lines).encode()
+
+
 def _append(path: Path, lines: Sequence[str]) -> None:
     """Adds lines to a history, all or none; if it begins anew, in the place of what was there."""
-    text = "".join(f"{line}\n" for line in lines).encode()
-    if lines and lines[0].startswith('{"begin"'):
+    text = _text(lines)
+    if _begins(lines):
         write_atomically(path, text)
     elif lines:
         with path.open("ab", buffering=0) as file:
@@ -230,16 +244,19 @@ def _append(path: Path, lines: Sequence[str]) -> None:
                 raise
 
 
-def _read_history(path: Path, document: Document, files: Collection[str]) -> History:
-    """What can be undone. The document counts, and whatever the history lacks: it is written after it.
+def _read_history(path: Path, since: object, document: Document, files: Collection[str]) -> History:
+    """What can be undone. The document counts, whatever the history lacks.
 
     Args:
         path: of the history.
+        since: the steps that were kept with the document, and at which byte of the history they belong; none before.
         document: as it was kept.
         files: names of the volumes that there are.
     """
     try:
-        *lines, rest = path.read_bytes().split(b"\n")
+        told = path.read_bytes()
+        whole = told if since is None else _since(told, since)
+        *lines, rest = whole.split(b"\n")
         history = History.replay(lines)
         if any(f"{part.volume}.npy.gz" not in files for one in history.documents() for part in one.parts):
             raise ValueError("the history needs a volume that is gone")
@@ -249,9 +266,20 @@ def _read_history(path: Path, document: Document, files: Collection[str]) -> His
     if history.now != document:
         history.do(document)
         history.retell()
-    elif rest:
+    elif rest or whole != told:
         history.retell()
     return history
+
+
+def _since(told: bytes, since: object) -> bytes:
+    """A history with the steps that were kept with the document, whether or not they, or a part of them, were added."""
+    entries = fields(since, "what was done since", ("after", "lines"))
+    after, lines = entries["after"], entries["lines"]
+    if type(after) is not int or not 0 <= after <= len(told):
+        raise ValueError("the history is shorter than it was")
+    if not isinstance(lines, list) or not all(isinstance(line, str) for line in lines):
+        raise ValueError("the steps since are no lines")
+    return told[:after] + _text(lines)
 
 
 def _read(place: Path) -> dict[str, Any]:
