@@ -8,12 +8,17 @@ from __future__ import annotations
 
 import importlib
 import json
+import os
 import sys
 import time
 from pathlib import Path
 from random import Random
 
-from harness import Finding, Target, judge, limit_memory, peak_megabytes
+from harness import Finding, Target, judge, limit_memory, megabytes, peak_megabytes
+from run import AGAIN
+
+GROWTH = 256
+"""Megabytes by which a process may grow before another takes over: under atheris some of what is compared leaks."""
 
 
 class Trial:
@@ -22,6 +27,12 @@ class Trial:
     def __init__(self, target: Target, folder: Path) -> None:
         self.target, self.folder, self.tried = target, folder, 0
         self._told = 0.0
+        self._began = self._limited = megabytes()
+
+    def begin(self) -> None:
+        """Limits the memory from now on."""
+        limit_memory(self.target.megabytes)
+        self._began = self._limited = megabytes()
 
     def attempt(self, data: bytes) -> None:
         """One input."""
@@ -32,6 +43,13 @@ class Trial:
             self._keep(finding, data)
         if time.monotonic() > self._told + 0.5:
             self.tell()
+        now = megabytes()
+        if now > self._began + GROWTH:
+            self.tell()
+            os._exit(AGAIN)
+        if now > self._limited + GROWTH // 8:  # what has leaked is no input's
+            limit_memory(self.target.megabytes)
+            self._limited = now
 
     def tell(self) -> None:
         """Says how far it is."""
@@ -65,7 +83,7 @@ def main() -> None:
     trial, seeds, random = Trial(target, Path(folder)), target.seeds(), Random(int(seed))
     for data in seeds:
         trial.attempt(data)
-    limit_memory(target.megabytes)
+    trial.begin()
     if engine == "plain":
         for data in seeds:
             trial.attempt(data)

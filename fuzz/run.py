@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import resource
 import shutil
 import subprocess
 import sys
@@ -24,19 +25,27 @@ HERE = Path(__file__).parent
 TARGETS = sorted(path.stem for path in (HERE / "targets").glob("[a-z]*.py"))
 PATIENCE = 90.0
 """Seconds without a sign of life, after which the process is ended and the input counts as a hang."""
+AGAIN = 75
+"""Exit code of a process that wants to be followed by another."""
 
 
 def fuzz(name: str, engine: str, budget: float, seed: int, findings: Path) -> dict[str, Any]:
     """Fuzzes a target; a process that dies is told of, and followed by another."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    spent = used.ru_utime + used.ru_stime
     memory = Path("/dev/shm")  # files that are synced to a disk would be what takes longest
     folder = Path(tempfile.mkdtemp(prefix=f"sketchcore-fuzz-{name}-", dir=memory if memory.is_dir() else None))
-    began, executions, peak, deaths = time.monotonic(), 0, 0, 0
+    began, executions, peak, deaths, processes = time.monotonic(), 0, 0, 0, 0
     while True:
         left = budget - (time.monotonic() - began) if engine == "atheris" else budget
-        (folder / "count").unlink(missing_ok=True)
-        death = _watched(name, folder, engine, seed + deaths, max(1, int(left)))
+        for old in ("count", "current"):
+            (folder / old).unlink(missing_ok=True)
+        code, death = _watched(name, folder, engine, seed + processes, max(1, int(left)))
+        processes += 1
         count = json.loads((folder / "count").read_text()) if (folder / "count").exists() else {}
         executions, peak = executions + count.get("executions", 0), max(peak, count.get("peak_mb", 0))
+        if code == AGAIN and time.monotonic() < began + budget:
+            continue
         if death is None:
             break
         deaths += 1
@@ -53,11 +62,13 @@ def fuzz(name: str, engine: str, budget: float, seed: int, findings: Path) -> di
     shutil.rmtree(folder)
     seconds = round(time.monotonic() - began, 1)
     row = {"target": name, "engine": engine, "executions": executions, "seconds": seconds, "findings": len(found)}
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    row |= {"cpu_seconds": round(used.ru_utime + used.ru_stime - spent, 1), "processes": processes}
     return row | {"peak_mb": peak, "found": [path.stem for path in found]}
 
 
-def _watched(name: str, folder: Path, engine: str, seed: int, budget: int) -> str | None:
-    """Runs the child; says how it died, if it did."""
+def _watched(name: str, folder: Path, engine: str, seed: int, budget: int) -> tuple[int, str | None]:
+    """Runs the child; its exit code, and how it died, if it did."""
     arguments = [sys.executable, str(HERE / "child.py"), name, str(folder), engine, str(seed), str(budget)]
     one = dict.fromkeys(("OMP_NUM_THREADS", "RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
     scratch = folder / "scratch"
@@ -70,10 +81,10 @@ def _watched(name: str, folder: Path, engine: str, seed: int, budget: int) -> st
             if current.exists() and time.time() > current.stat().st_mtime + PATIENCE:
                 child.kill()
                 child.wait()
-                return f"no sign of life for {PATIENCE:g} seconds"
-    if child.returncode == 0:
-        return None
-    return f"exit code {child.returncode}\n" + (folder / "log").read_text(errors="replace")[-4000:]
+                return child.returncode, f"no sign of life for {PATIENCE:g} seconds"
+    if child.returncode in (0, AGAIN):
+        return child.returncode, None
+    return child.returncode, f"exit code {child.returncode}\n" + (folder / "log").read_text(errors="replace")[-4000:]
 
 
 def main() -> None:
