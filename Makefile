@@ -10,12 +10,18 @@ CARGO_TARGET_DIR ?= target
 export CARGO_TARGET_DIR
 export PIP_QUIET := 1
 
-.PHONY: all format build lint test test-rust test-python fuzz audit demo bench docs wheel clean
+# `make` installs the versions of the lock; LATEST=1 the newest, as users get them (then begin with `make clean`).
+LOCK := packaging/development.lock
+ifndef LATEST
+export PIP_CONSTRAINT := $(abspath $(LOCK))
+endif
+
+.PHONY: all format build lint test test-rust test-python fuzz audit lock demo bench docs wheel clean
 
 all: format build lint test
 
 # Dependencies, and the tools of development.
-$(READY): pyproject.toml
+$(READY): pyproject.toml $(LOCK)
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --upgrade pip
 	$(BIN)/pip install --quiet --group dev
@@ -64,6 +70,17 @@ audit: $(READY)
 	$(BIN)/pip-audit --local --skip-editable
 	cargo audit
 
+# The newest versions, in an environment of its own, become those of the lock.
+lock:
+	rm -rf out/lock && $(PYTHON) -m venv out/lock
+	PIP_CONSTRAINT= out/lock/bin/pip install --quiet --upgrade pip
+	PIP_CONSTRAINT= out/lock/bin/pip install --quiet --group dev
+	PIP_CONSTRAINT= out/lock/bin/pip install --quiet .
+	grep '^#' $(LOCK) > out/lock/kept
+	out/lock/bin/pip freeze --exclude sketchcore | grep -viE '^(torch|triton|nvidia|cuda)' >> out/lock/kept
+	mv out/lock/kept $(LOCK)
+	rm -rf out/lock
+
 demo: $(BUILT)
 	$(BIN)/python examples/demo.py
 
@@ -82,7 +99,7 @@ docs: $(BUILT)
 # sources, and runs the demo there.
 wheel: $(READY)
 	$(BIN)/maturin build --release --sdist --quiet --out out/dist
-	packaging/try-wheel out/dist/*.whl
+	PIP_CONSTRAINT= packaging/try-wheel out/dist/*.whl
 
 clean:
 	rm -rf $(VENV) target out
