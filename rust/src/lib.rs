@@ -25,6 +25,7 @@ pub mod brush;
 pub mod buffers;
 pub mod camera;
 pub mod carve;
+pub mod convolution;
 pub mod csg;
 mod dispatch;
 pub mod distance;
