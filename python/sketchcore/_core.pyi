@@ -1,11 +1,12 @@
 """The Rust kernels. Arrays are C-contiguous; cameras and shapes are packed (`Camera.packed`, `Shape.packed`)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "CompactNetwork",
     "bilateral",
     "buffers",
     "carve",
@@ -137,3 +138,56 @@ def bilateral(
     sigma_spatial: float,
     sigma_normal: float,
 ) -> NDArray[np.float64]: ...
+
+class CompactNetwork:
+    """The compact network on the CPU, float32, weights laid out once: `CompactNet` for whoever only asks.
+
+    Several threads may ask at once. Its own threads are those of rayon's pool.
+
+    Args:
+        weights: by the names of `CompactNet.state_dict()`, float32.
+        stem, image, features, fused, world, groups: as in `CompactConfig`.
+
+    Raises:
+        ValueError: for widths that no network has, or weights that do not fit them.
+    """
+
+    def __new__(
+        cls,
+        weights: Mapping[str, NDArray[np.float32]],
+        *,
+        stem: int,
+        image: tuple[int, int, int],
+        features: int,
+        fused: int,
+        world: tuple[int, int, int],
+        groups: int,
+    ) -> CompactNetwork: ...
+    def read(
+        self,
+        drawings: NDArray[np.uint8],
+        fields: NDArray[np.uint8],
+        cameras: NDArray[np.float64],
+        counts: Sequence[int],
+        evidence: NDArray[np.uint8],
+    ) -> NDArray[np.float32]:
+        """What does not change from round to round, float32 [B, 32 * 32 * 16, width + 8].
+
+        Args:
+            drawings: [D, 256, 256], those of the first object first.
+            fields: [D, 256, 256, 2], `evidence_fields`.
+            cameras: [D, 15], packed.
+            counts: drawings of each object, 1 or more; they add up to D.
+            evidence: [B, 3, 64, 64, 32], `evidence` of each object's drawings.
+        """
+
+    def decide(
+        self, readings: NDArray[np.float32], prior: NDArray[np.float32] | None, counts: Sequence[int]
+    ) -> NDArray[np.float32]:
+        """Probability of occupancy of each cell's eight voxels, float32 [B, 32, 32, 16, 8].
+
+        Args:
+            readings: from `read`.
+            prior: what an earlier round decided, of the same form.
+            counts: drawings of each object, 1 or more.
+        """

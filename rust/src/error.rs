@@ -45,6 +45,16 @@ pub enum CoreError {
     NoShape { attempts: u32 },
     #[error("could not start {threads} threads: {reason}")]
     Threads { threads: usize, reason: String },
+    #[error("the weights do not fit the network of their config: {0}")]
+    Misfit(String),
+    #[error("{what} must be whole, 1 to {most}, got {width}", most = crate::network::widths::MAX_WIDTH)]
+    Width { what: &'static str, width: usize },
+    #[error("a width of {width} cannot be shared by {among} {what}")]
+    CannotShare { width: usize, among: usize, what: &'static str },
+    #[error("counts must add up to the number of drawings, {drawings}; got {counts:?}")]
+    Counts { counts: Vec<usize>, drawings: usize },
+    #[error("each object needs at least one drawing; object {object} has none")]
+    NoDrawings { object: usize },
     #[error("the batch was stopped before it was finished")]
     Stopped,
 }

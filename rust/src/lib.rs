@@ -12,6 +12,7 @@
 //!
 //! drawing -> distance -> carve, evidence                     what drawings say about space
 //! resample, lift                                             world grid <-> camera grid, <- image features
+//! convolution -> network                                     drawings -> what is probably there, world grid
 //! isosurface                                                 a volume as a camera sees it
 //! mesh                                                       the surface that leaves the package
 //! ```
@@ -25,6 +26,7 @@ pub mod brush;
 pub mod buffers;
 pub mod camera;
 pub mod carve;
+pub mod convolution;
 pub mod csg;
 mod dispatch;
 pub mod distance;
@@ -39,6 +41,7 @@ pub mod kinds;
 pub mod lift;
 pub mod lines;
 pub mod mesh;
+pub mod network;
 pub mod pen;
 #[cfg(feature = "python")]
 mod python;

@@ -5,6 +5,7 @@ mod arrays;
 mod drawings;
 mod lift;
 mod meshes;
+mod network;
 mod pools;
 mod samples;
 mod strokes;
@@ -48,6 +49,8 @@ mod _core {
     use super::lift::{lift, lift_taps, lift_transposed};
     #[pymodule_export]
     use super::meshes::{draw_mesh, draw_mesh_views, mesh_buffers, mesh_frusta, mesh_shares, voxelize_mesh};
+    #[pymodule_export]
+    use super::network::CompactNetwork;
     #[pymodule_export]
     use super::samples::{default_config, fit, generate};
     #[pymodule_export]
