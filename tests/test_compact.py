@@ -12,11 +12,14 @@ import torch
 import sketchcore as sk
 from sketchcore import _core
 from sketchcore.datagen import generate
-from sketchcore.nets.compact import CompactConfig, CompactNet
+from sketchcore.nets.cells import Cells, flip, whole
+from sketchcore.nets.compact import CompactNet
+from sketchcore.nets.compactmodel import CompactModel
+from sketchcore.nets.config import CompactConfig
 from sketchcore.nets.decoder import fold, unfold
-from sketchcore.nets.inference import flip_cells, whole
-from sketchcore.nets.models import CompactModel
+from sketchcore.nets.loading import passes_of
 from sketchcore.nets.outlines import heed_outlines
+from sketchcore.nets.passes import Reading
 from sketchcore.nets.pieces import join_pieces
 from sketchcore.nets.sketches import Sketches, mirror_cameras
 from sketchcore.train.chains import Chain, compact_inputs
@@ -48,6 +51,10 @@ def awake(net: CompactNet) -> CompactNet:
         if parameter.abs().max() == 0:
             torch.nn.init.normal_(parameter, std=0.1)
     return net.eval()
+
+
+def tiny_model() -> CompactModel:
+    return CompactModel(passes_of(awake(CompactNet(TINY)), CPU))
 
 
 def test_the_shipped_size_is_within_its_bound() -> None:
@@ -129,24 +136,24 @@ def test_a_mirrored_look_has_the_same_evidence() -> None:
     shape = sk.Shape([sk.Cuboid((0, 0, 0), (0.3, 0.2, 0.25)), sk.Cuboid((0.2, 0.2, 0), (0.1, 0.2, 0.1))])
     cameras = [sk.VIEWPOINTS[name] for name in ("quarter-052", "right")]
     sketches = Sketches(np.stack([sk.draw(shape, c) for c in cameras]), np.stack([c.packed for c in cameras]))
+    about_z, along_x = (sketches.mirrored(axis).evidence.astype(int) for axis in (2, 0))  # made anew
     plain = sketches.evidence.astype(int)
-    about_z, along_x = (sketches.mirrored(axis).evidence.astype(int) for axis in (2, 0))
     assert (np.abs(plain - about_z) > 1).mean() < 0.01
     assert (np.abs(plain[:, ::-1] - along_x) > 1).mean() < 0.01
     assert (np.abs(plain - along_x) > 1).mean() > 0.05, "this shape is not symmetric along x"
 
 
 def test_rounds_take_turns_and_average() -> None:
-    model = CompactModel(awake(CompactNet(TINY)), CPU)
+    model = tiny_model()
     sketches = chains((2,))[0].sketches
     looks = []
-    read = model.net.read
+    read = model.passes.read
 
-    def seen(samples: Sequence[Sketches], evidence: torch.Tensor) -> torch.Tensor:
+    def seen(samples: Sequence[Sketches]) -> list[Reading]:
         looks.append(samples[0].cameras)
-        return read(samples, evidence)
+        return read(samples)
 
-    model.net.read = seen  # type: ignore[method-assign]
+    model.passes.read = seen  # type: ignore[method-assign]
     volumes = list(model.rounds(sketches, 5))
     assert len(volumes) == 6
     cameras = sketches.cameras
@@ -160,32 +167,31 @@ def test_rounds_take_turns_and_average() -> None:
 
 
 def test_a_look_along_x_answers_in_the_world_as_it_is() -> None:
-    model = CompactModel(awake(CompactNet(TINY)), CPU)
+    model = tiny_model()
     sketches = chains((2,))[0].sketches
-    evidence = model.net.evidence([sketches])
     # To the network, the second round is a mirrored world: it reads and knows what it would of that one.
     calls = []
-    decide = model.net.decide
+    decide = model.passes.decide
 
-    def heard(readings: torch.Tensor, prior: torch.Tensor | None, counts: Sequence[int]) -> torch.Tensor:
+    def heard(readings: Sequence[Reading], prior: Cells | None, counts: Sequence[int]) -> Cells:
         calls.append((readings, prior, decide(readings, prior, counts)))
         return calls[-1][2]
 
-    model.net.decide = heard  # type: ignore[method-assign]
+    model.passes.decide = heard  # type: ignore[method-assign]
     _, second = model.rounds(sketches, 1)
     (_, _, first_answer), (readings, prior, answer) = calls
     assert prior is not None
-    torch.testing.assert_close(readings, model.net.read([sketches.mirrored(0)], flip_cells(evidence)))
-    torch.testing.assert_close(prior, flip_cells(first_answer))
-    mean = whole((first_answer + flip_cells(answer)) / 2)
+    np.testing.assert_array_equal(readings[0], model.passes.read([sketches.mirrored(0)])[0])
+    np.testing.assert_array_equal(prior[0], flip(first_answer[0]))
+    mean = whole((first_answer[0] + flip(answer[0])) / 2)
     np.testing.assert_allclose(second, join_pieces(heed_outlines(mean, sketches)), atol=1e-6)
 
 
 def test_both_directions_along_x_weigh_the_same() -> None:
-    model = CompactModel(awake(CompactNet(TINY)), CPU)
+    model = tiny_model()
     sketches = chains((1,))[0].sketches
     said = iter([0.1, 0.2, 0.4, 0.5, 0.6])
-    model.net.decide = lambda *_: torch.full((1, 32, 32, 16, 8), next(said))  # type: ignore[method-assign]
+    model.passes.decide = lambda *_: np.full((1, 32, 32, 16, 8), next(said), np.float32)  # type: ignore[method-assign]
     means = [0.1, (0.1 + 0.2) / 2, (0.1 + 0.3) / 2, (0.3 + 0.3) / 2, ((0.1 + 0.5 + 0.6) / 3 + 0.3) / 2]
     for mean, volume in zip(means, model.rounds(sketches, 4), strict=True):
         expected = heed_outlines(np.full((64, 64, 64), mean, np.float32), sketches)
@@ -193,11 +199,11 @@ def test_both_directions_along_x_weigh_the_same() -> None:
 
 
 def test_a_volume_known_before_is_one_prediction_among_others() -> None:
-    model = CompactModel(awake(CompactNet(TINY)), CPU)
+    model = tiny_model()
     sketches = chains((1,))[0].sketches
     start = np.zeros((64, 64, 64), np.float32)
     start[:, :, :32] = 1.0
-    model.net.decide = lambda *_: torch.full((1, 32, 32, 16, 8), 0.2)  # type: ignore[method-assign]
+    model.passes.decide = lambda *_: np.full((1, 32, 32, 16, 8), 0.2, np.float32)  # type: ignore[method-assign]
     for number, volume in enumerate(model.rounds(sketches, 3, start)):
         mean = np.full((64, 64, 64), (0.5 + (number + 1) * 0.2) / (number + 2), np.float32)
         np.testing.assert_allclose(volume, join_pieces(heed_outlines(mean, sketches)), rtol=1e-5)

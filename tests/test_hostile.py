@@ -27,10 +27,11 @@ from sketchcore.app.sessionfile import read_session, write_session
 from sketchcore.datagen.prepared import VERSION, Prepared, load_found, load_object
 from sketchcore.meshfile import load_mesh
 from sketchcore.nets import weights
-from sketchcore.nets.compact import CompactConfig
-from sketchcore.nets.models import build_model
+from sketchcore.nets.config import CompactConfig
+from sketchcore.nets.loading import build_model
+from sketchcore.nets.storing import save_weights
 from sketchcore.nets.unet import PaperNet
-from sketchcore.nets.weights import load_weights, save_weights
+from sketchcore.nets.weights import load_weights
 from sketchcore.train.checkpoint import Progress, load_checkpoint, save_checkpoint
 
 # Pictures
@@ -294,8 +295,8 @@ def _safetensors(header: object, body: bytes = b"") -> bytes:
     ("data", "message"),
     [
         ((2**40).to_bytes(8, "little") + b"{}", "header would have more than 16 MiB"),
-        (_safetensors({"a": {"dtype": "F8_E4M3", "shape": [2], "data_offsets": [0, 2]}}, b"\0\0"), r"float8|corrupt"),
-        (_safetensors({"a": {"dtype": "C64", "shape": [1], "data_offsets": [0, 8]}}, b"\0" * 8), r"complex|corrupt"),
+        (_safetensors({"a": {"dtype": "F8_E4M3", "shape": [2], "data_offsets": [0, 2]}}, b"\0\0"), "F8_E4M3"),
+        (_safetensors({"a": {"dtype": "C64", "shape": [1], "data_offsets": [0, 8]}}, b"\0" * 8), "C64"),
         (_safetensors({"a": {"dtype": "F32", "shape": [2**40], "data_offsets": [0, 4]}}, b"\0" * 4), "corrupt"),
         (_safetensors({"a": {"dtype": "F32", "shape": [1], "data_offsets": [0, 2**50]}}, b"\0" * 4), "corrupt"),
         (_safetensors([]), "corrupt"),
@@ -320,7 +321,7 @@ def test_weights_have_a_largest_size(net: Path, monkeypatch: pytest.MonkeyPatch)
 def test_integers_are_no_weights(net: Path) -> None:
     state, config = load_weights(net)
     with pytest.raises(ValueError, match=r"must be .* got .*int64"):
-        build_model({name: tensor.long() for name, tensor in state.items()}, config, "cpu")
+        build_model({name: array.astype(np.int64) for name, array in state.items()}, config, "cpu")
 
 
 @pytest.mark.parametrize(

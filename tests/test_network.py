@@ -19,9 +19,10 @@ from safetensors.numpy import load_file, save_file
 
 from sketchcore import _core
 from sketchcore.datagen import generate
-from sketchcore.nets.compact import CompactConfig, CompactNet, read_inputs
+from sketchcore.nets.compact import CompactNet, read_inputs
+from sketchcore.nets.config import CompactConfig
 from sketchcore.nets.decoder import fold
-from sketchcore.nets.models import build_model
+from sketchcore.nets.filled import filled
 from sketchcore.nets.sketches import Sketches
 
 TINY = CompactConfig(stem=8, image=(16, 16, 16), features=8, fused=8, world=(8, 16, 16), groups=2)
@@ -259,13 +260,12 @@ def test_weights_that_do_not_fit_are_refused(case: str) -> None:
     assert str(raised.value) == f"the weights do not fit the network of their config: {fault}"
 
 
-def test_it_is_said_as_it_was_for_torch() -> None:
+def test_it_is_said_as_for_torch() -> None:
     weights = without("encoder.attention.place")
-    config = {"network": "compact", "options": asdict(TINY)}
     with pytest.raises(ValueError) as ours:
         made(weights, TINY)
     with pytest.raises(ValueError) as theirs:
-        build_model({name: torch.from_numpy(w) for name, w in weights.items()}, config, "cpu")
+        filled(lambda: CompactNet(TINY), weights, "compact")
     assert str(ours.value) == str(theirs.value)
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import torch
 
 import sketchcore as sk
-from sketchcore.nets.models import CompactModel
+from sketchcore.nets.compactmodel import CompactModel
 from sketchcore.nets.sketches import Sketches
 
 SIZES = (1, 2, 4, 8)
@@ -23,9 +23,9 @@ def main() -> None:
     assert isinstance(model, CompactModel)
     batch = sk.generate(0, max(SIZES), views=2)
     objects = [Sketches(*pair) for pair in zip(batch.drawings, batch.packed_cameras, strict=True)]
-    evidence = model.net.evidence(objects)
-    readings = model.net.read(objects, evidence)
-    prior = model.net.decide(readings, None, [2] * len(objects))
+    evidence = model.passes.evidence(objects)
+    readings = model.passes.read(objects, evidence)
+    prior = model.passes.decide(readings, None, [2] * len(objects))
     threads = sorted({1, torch.get_num_threads()})
     print(
         "| objects in a pass | " + " | ".join(f"{n} thread{'s' * (n > 1)}: wall, CPU ms each" for n in threads) + " |"
@@ -35,7 +35,7 @@ def main() -> None:
         cells = []
         for count in threads:
             torch.set_num_threads(count)
-            wall, cpu = least(lambda size=size: model.net.decide(readings[:size], prior[:size], [2] * size))
+            wall, cpu = least(lambda size=size: model.passes.decide(readings[:size], prior[:size], [2] * size))
             cells.append(f"{1000 * wall / size:.1f}, {1000 * cpu / size:.1f}")
         print(f"| {size} | " + " | ".join(cells) + " |", flush=True)
 

@@ -12,7 +12,8 @@ from safetensors.torch import save
 import sketchcore as sk
 from harness import SCRATCH, Target
 from mutations import dump, of_bytes, of_json, of_safetensors
-from sketchcore.nets.compact import CompactConfig, CompactNet
+from sketchcore.nets.compact import CompactNet
+from sketchcore.nets.config import CompactConfig
 from sketchcore.nets.multiscale import MultiscaleNet
 from sketchcore.nets.sketches import Sketches
 from sketchcore.nets.unet import PaperNet

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from sketchcore.camera import Camera, as_camera, pack_cameras
 from sketchcore.drawing import load_drawing
 from sketchcore.mesh import MESH_SUFFIXES, extract_mesh, save_mesh
-from sketchcore.nets.models import Model, build_model
+from sketchcore.nets.loading import build_model
+from sketchcore.nets.model import Model
 from sketchcore.nets.sketches import Sketches
 from sketchcore.nets.weights import PRETRAINED, load_weights
 from sketchcore.rounds import TOLERANCE, Volume, until_settled
@@ -24,6 +24,7 @@ from sketchcore.viewpoint import guess_camera
 from sketchcore.volume import load_binvox, load_npz, save_binvox, save_npz
 
 if TYPE_CHECKING:
+    import torch
     import trimesh
 
 View = str | Camera

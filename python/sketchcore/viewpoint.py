@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sketchcore.camera import QUARTER_VIEWS, VIEWPOINTS, Camera, pack_cameras
 from sketchcore.directions import Directions
-from sketchcore.nets.models import Model
+from sketchcore.nets.model import Model
 from sketchcore.nets.placement import NEAR, plausibility
 from sketchcore.nets.sketches import Sketches
 from sketchcore.outline import outline_iou

@@ -20,7 +20,8 @@ import trimesh
 
 from sketchcore.datagen.export import Export, export
 from sketchcore.mesh import save_mesh
-from sketchcore.nets.weights import load_weights, save_weights
+from sketchcore.nets.storing import save_weights
+from sketchcore.nets.weights import load_weights
 from sketchcore.train.checkpoint import Progress, load_checkpoint, save_checkpoint
 from sketchcore.volume import save_binvox, save_npz
 

@@ -63,11 +63,11 @@ def serve_http(
         missing = [package for package in ("fastapi", "uvicorn", "python_multipart") if find_spec(package) is None]
         if missing:
             raise ValueError(f"the server needs {', '.join(missing)}; install by: pip install 'sketchcore[serve]'")
-        from sketchcore.nets.precision import pick_device
+        from sketchcore.nets.loading import on_cpu
         from sketchcore.serve.launch import launch
         from sketchcore.serve.service import Limits, cores
 
-        gpu = pick_device(device).type != "cpu"
+        gpu = not on_cpu(device)
         limits = Limits(
             workers or (8 if gpu else cores()),
             batch or (8 if gpu else 1),

@@ -16,7 +16,7 @@ from sketchcore.evaluate.figure import Figure
 from sketchcore.evaluate.report import Report
 from sketchcore.evaluate.testset import Example, count_shapes, load_meshes, load_testset
 from sketchcore.grids import carve, to_world_grid
-from sketchcore.nets.models import Model
+from sketchcore.nets.model import Model
 from sketchcore.nets.sketches import Sketches
 from sketchcore.rounds import TOLERANCE, Volume, until_settled
 from sketchcore.viewpoint import guess_viewpoint, opposite

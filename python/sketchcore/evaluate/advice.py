@@ -15,7 +15,7 @@ from sketchcore.evaluate.figure import Figure
 from sketchcore.evaluate.report import Report
 from sketchcore.evaluate.testset import Example, count_shapes, load_testset
 from sketchcore.grids import draw
-from sketchcore.nets.models import Model
+from sketchcore.nets.model import Model
 from sketchcore.rounds import Volume
 from sketchcore.volume import iou
 

@@ -13,7 +13,7 @@ from sketchcore.evaluate.accuracy import ROUNDS, VIEWS, predictions
 from sketchcore.evaluate.figure import Figure
 from sketchcore.evaluate.report import Report
 from sketchcore.evaluate.testset import Example, count_shapes, load_testset
-from sketchcore.nets.models import Model
+from sketchcore.nets.model import Model
 from sketchcore.nets.sketches import Sketches
 from sketchcore.volume import iou
 

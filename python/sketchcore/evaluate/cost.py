@@ -34,8 +34,8 @@ class Cost(Report):
         rounds: how many of the five were run, before the solid had settled: mean.
         first_call: seconds from `import sketchcore` to the first solid, from one drawing, in a fresh process.
         peak: megabytes (10^6 bytes) of memory that a process held at most, which did that and then all
-            reconstructions timed here: torch and the interpreter included.
-        threads: how many torch computed on.
+            reconstructions timed here: the interpreter and everything that was imported included.
+        threads: how many cores it computed on.
         shapes: how many shapes were reconstructed.
     """
 
@@ -137,6 +137,6 @@ def cost_as_table(cost: Cost) -> Table:
         table.add_row(name, *(f"{ms:.0f} ms" for ms in times))
     table.caption = (
         f"first call {cost.first_call:.1f} s, imports and weights included; "
-        f"at most {cost.peak:.0f} MB of memory, torch included"
+        f"at most {cost.peak:.0f} MB of memory, everything included"
     )
     return table

@@ -37,14 +37,14 @@ def main() -> None:
                     seconds[n - 1].append(time.perf_counter() - begun)
                     rounds[n - 1].append(len(solid.trace))
         print(json.dumps([done, len(objects)]), flush=True)
-    import torch
+    from sketchcore.serve.service import cores
 
     figures = {
         "first_call": first_call,
         "seconds": seconds,
         "rounds": rounds,
         "peak": peak_memory(),
-        "threads": torch.get_num_threads(),
+        "threads": cores(),
     }
     print(json.dumps(figures))
 

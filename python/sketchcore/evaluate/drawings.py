@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sketchcore.evaluate.report import Report
-from sketchcore.nets.models import Model
+from sketchcore.nets.model import Model
 from sketchcore.outline import outline_iou, pieces
 from sketchcore.picture import save_picture
 from sketchcore.reconstruction import reconstruct

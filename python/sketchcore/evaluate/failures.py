@@ -16,7 +16,7 @@ from sketchcore.camera import VIEWPOINTS, Camera
 from sketchcore.evaluate.accuracy import ROUNDS, predictions
 from sketchcore.evaluate.report import Report
 from sketchcore.evaluate.testset import Example, count_shapes, load_testset
-from sketchcore.nets.models import Model
+from sketchcore.nets.model import Model
 from sketchcore.picture import shade
 from sketchcore.viewpoint import opposite
 from sketchcore.volume import iou

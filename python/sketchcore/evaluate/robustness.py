@@ -12,7 +12,7 @@ from sketchcore.evaluate.distort import STRENGTHS, distorted
 from sketchcore.evaluate.figure import Figure
 from sketchcore.evaluate.report import Report
 from sketchcore.evaluate.testset import ShapeExample, count_shapes, load_testset
-from sketchcore.nets.models import Model
+from sketchcore.nets.model import Model
 from sketchcore.volume import iou
 
 COUNTS = (1, VIEWS)

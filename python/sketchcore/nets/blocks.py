@@ -6,6 +6,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from sketchcore.nets.config import HEADS
+
 
 class Block(nn.Module):
     """Two convolutions of 3 cells a side around a normalisation per sample that a code scales and shifts.
@@ -40,14 +42,10 @@ class Attention(nn.Module):
     Args:
         width: channels.
         cells: how many cells there are.
-        heads: attention heads.
     """
 
-    def __init__(self, width: int, cells: int, heads: int = 8) -> None:
+    def __init__(self, width: int, cells: int) -> None:
         super().__init__()
-        if width % heads:
-            raise ValueError(f"a width of {width} cannot be shared by {heads} attention heads")
-        self.heads = heads
         self.norm = nn.LayerNorm(width)
         self.place = nn.Parameter(nn.init.normal_(torch.empty(1, cells, width), std=0.02))
         self.into = nn.Linear(width, 3 * width)
@@ -57,7 +55,7 @@ class Attention(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         cells = x.flatten(2).transpose(1, 2)
         batch, count, width = cells.shape
-        parts = self.into(self.norm(cells + self.place)).view(batch, count, 3, self.heads, -1)
+        parts = self.into(self.norm(cells + self.place)).view(batch, count, 3, HEADS, -1)
         q, k, v = parts.permute(2, 0, 3, 1, 4)
         seen = F.scaled_dot_product_attention(q, k, v).transpose(1, 2).reshape(batch, count, width)
         out: Tensor = x + self.out(seen).transpose(1, 2).reshape(x.shape)

@@ -9,8 +9,8 @@ round.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -19,57 +19,12 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from sketchcore.nets.config import CompactConfig
 from sketchcore.nets.decoder import WorldDecoder
 from sketchcore.nets.encoder import DrawingEncoder
 from sketchcore.nets.lift import COARSE, lift
 from sketchcore.nets.precision import unit
 from sketchcore.nets.sketches import Sketches
-
-MAX_WIDTH = 4096
-"""Channels of any layer."""
-
-
-@dataclass(frozen=True)
-class CompactConfig:
-    """Widths (channels) of `CompactNet`.
-
-    Attributes:
-        stem: of the encoder at 64^2.
-        image: of the encoder at 32^2, 16^2 and 8^2.
-        features: of each pixel and depth of a drawing.
-        fused: of what a cell reads from one drawing.
-        world: of the decoder with 32, 16 and 8 cells along x and y.
-        groups: groups of each group normalisation.
-
-    Raises:
-        ValueError: for a width that is no whole number from 1 to 4096.
-    """
-
-    stem: int = 64
-    image: tuple[int, int, int] = (96, 192, 256)
-    features: int = 16
-    fused: int = 32
-    world: tuple[int, int, int] = (32, 96, 192)
-    groups: int = 8
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value, several = getattr(self, field.name), isinstance(field.default, tuple)
-            each = value if several and isinstance(value, tuple) else (value,)
-            if several and len(each) != 3:
-                raise ValueError(f"{field.name} must be 3 widths, got {value!r:.80}")
-            if not all(type(width) is int and 1 <= width <= MAX_WIDTH for width in each):
-                raise ValueError(f"{field.name} must be whole, 1 to {MAX_WIDTH}, got {value!r:.80}")
-
-    @classmethod
-    def of_options(cls, options: Mapping[str, Any]) -> CompactConfig:
-        """The configuration of options by name; where they come out of JSON, tuples are lists.
-
-        Raises:
-            TypeError: for an option that there is not.
-        """
-        tuples: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in options.items()}
-        return cls(**tuples)
 
 
 class CompactNet(nn.Module):

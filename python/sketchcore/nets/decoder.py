@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from sketchcore.nets.blocks import Attention, Block, twice
+from sketchcore.nets.config import CompactConfig
 from sketchcore.nets.lift import COARSE
-
-if TYPE_CHECKING:
-    from sketchcore.nets.compact import CompactConfig
 
 EVIDENCE = 3
 """Volumes of `_core.evidence`."""

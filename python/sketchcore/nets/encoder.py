@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from sketchcore.nets.blocks import Attention, Block, twice
+from sketchcore.nets.config import CompactConfig
 from sketchcore.nets.lift import BINS, PLANE
-
-if TYPE_CHECKING:
-    from sketchcore.nets.compact import CompactConfig
 
 
 class DrawingEncoder(nn.Module):

@@ -1,8 +1,8 @@
-"""`CompactNet` as a reconstruction runs it: weights cast and laid out once, and nothing computed twice.
+"""`CompactNet` as a reconstruction runs it by torch, on a GPU: weights cast once, and nothing computed twice.
 
 The first layer of the decoder is linear in what was read, in the evidence and in the prior. The prior alone changes
-from round to round, so what the layer makes of all else is kept. Volumes stay in the decoder's own layout, cells of two
-voxels a side, until they are handed out.
+from round to round, so what the layer makes of all else is kept. On the CPU the same is done without torch
+(`native.py`).
 """
 
 from __future__ import annotations
@@ -11,16 +11,17 @@ import math
 from collections.abc import Sequence
 from copy import deepcopy
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from sketchcore.nets.cells import Cells
 from sketchcore.nets.compact import CompactNet, read_inputs
-from sketchcore.nets.decoder import EVIDENCE, fold, unfold
+from sketchcore.nets.decoder import EVIDENCE, fold
 from sketchcore.nets.lift import COARSE, lift
 from sketchcore.nets.precision import fast_dtype, place, unit
 from sketchcore.nets.sketches import Sketches
-from sketchcore.rounds import Volume
 
 PAIR = 2
 """Drawings that are encoded side by side: more are no faster, and each takes 10 MB meanwhile."""
@@ -49,21 +50,11 @@ class CompactInference:
         self._where = torch.addmm(bias.to(device, torch.float32), places, where)
 
     @torch.inference_mode()
-    def evidence(self, samples: Sequence[Sketches]) -> Tensor:
-        """float32 [B, 32, 32, 16, 24] in 0..1, the evidence of each object's drawings; for `read`."""
-        volumes = [fold(torch.from_numpy(s.evidence)[None]) for s in samples]
-        return unit(torch.cat(volumes).numpy(), self.device)
-
-    @torch.inference_mode()
-    def read(self, samples: Sequence[Sketches], evidence: Tensor) -> Tensor:
+    def read(self, samples: Sequence[Sketches]) -> list[Tensor]:
         """What does not change from round to round: the decoder's first layers, but for the prior.
 
-        Args:
-            samples: the drawings of each object.
-            evidence: float32 [B, 32, 32, 16, 24], from `evidence`.
-
         Returns:
-            [B, 32 * 32 * 16, width of the decoder's first layer + 8].
+            for each object [32 * 32 * 16, width of the decoder's first layer + 8].
         """
         inputs = read_inputs(samples, self.device)
         cameras, counts = inputs["cameras"], inputs["counts"]
@@ -75,45 +66,25 @@ class CompactInference:
             lifted = lift(self._net.encoder(drawings[some], fields[some], rotations[some]), cameras[some])
             each[some] = F.linear(lifted, *self._reading).relu_()
         out = []
-        for own, known in zip(torch.split(each, counts), evidence.flatten(1, 3), strict=True):
+        for own, sketches in zip(torch.split(each, counts), samples, strict=True):
             seen = torch.cat([own.mean(dim=0), own.amax(dim=0)], dim=-1).to(self.dtype)
-            kept = torch.addmm(self._where, known, self._evidence).to(self.dtype)
+            evidence = fold(unit(sketches.evidence, self.device)[None]).flatten(0, 3)
+            kept = torch.addmm(self._where, evidence, self._evidence).to(self.dtype)
             out.append(torch.addmm(kept, seen, self._seen))
-        return torch.stack(out)
+        return out
 
     @torch.inference_mode()
-    def decide(self, readings: Tensor, prior: Tensor | None, counts: Sequence[int]) -> Tensor:
-        """Occupancy from what was read and a prior.
-
-        Args:
-            readings: from `read`.
-            prior: float [B, 32, 32, 16, 8], probability of occupancy of each cell's voxels (`fold`); None for none.
-            counts: drawings of each object.
-
-        Returns:
-            float32 [B, 32, 32, 16, 8], probability of occupancy.
-        """
-        decoder, batch = self._net.decoder, len(readings)
+    def decide(self, readings: Sequence[Tensor], prior: Cells | None, counts: Sequence[int]) -> Cells:
+        """Occupancy from what was read and a prior, as `Passes.decide` says."""
+        decoder, read, batch = self._net.decoder, torch.stack(list(readings)), len(readings)
         if prior is not None:
-            readings = readings + prior.to(self.dtype).view(batch, -1, 8) @ self._prior
+            known = torch.from_numpy(np.ascontiguousarray(prior)).to(self.device, self.dtype)
+            read = read + known.view(batch, -1, 8) @ self._prior
         x, shortcut = (
             part.contiguous().view(batch, *COARSE, -1).permute(0, 4, 1, 2, 3)
-            for part in torch.split(readings, [readings.shape[-1] - 8, 8], dim=-1)
+            for part in torch.split(read, [read.shape[-1] - 8, 8], dim=-1)
         )
         condition = [[float(prior is not None), count / 4] for count in counts]
         code = decoder.condition(torch.tensor(condition, dtype=self.dtype, device=self.device))
-        probability: Tensor = decoder.fuse(x, shortcut, code).permute(0, 2, 3, 4, 1).float().sigmoid()
-        return probability
-
-
-def flip_cells(cells: Tensor) -> Tensor:
-    """Volumes in cells, [B, x, y, z, 8 * n] (`fold`), mirrored along x."""
-    parts = cells.view(*cells.shape[:4], -1, 2, 2, 2)
-    return parts.flip(1, 5).reshape(cells.shape)
-
-
-def whole(cells: Tensor) -> Volume:
-    """A symmetric volume, float32 [64, 64, 64] (x, y, z), from the cells of its half z > 0, [1, 32, 32, 16, 8]."""
-    half = unfold(cells.permute(0, 4, 1, 2, 3))[0]
-    array: Volume = torch.cat([half.flip(2), half], dim=2).cpu().numpy()
-    return array
+        cells: Cells = decoder.fuse(x, shortcut, code).permute(0, 2, 3, 4, 1).float().sigmoid().cpu().numpy()
+        return cells

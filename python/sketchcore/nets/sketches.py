@@ -58,7 +58,11 @@ class Sketches:
     def mirrored(self, axis: int) -> Sketches:
         """The object mirrored along a world axis (0 or 2 for x or z), as mirrored cameras see it."""
         drawings, fields = (np.ascontiguousarray(images[:, :, ::-1]) for images in (self.drawings, self.fields))
-        return _known(drawings, mirror_cameras(self.cameras, axis), fields)
+        mirrored = _known(drawings, mirror_cameras(self.cameras, axis), fields)
+        if "evidence" in self.__dict__:  # about z = 0 it is the same
+            evidence = np.ascontiguousarray(self.evidence[:, ::-1]) if axis == 0 else self.evidence
+            mirrored.__dict__["evidence"] = evidence
+        return mirrored
 
 
 def _known(drawings: NDArray[np.uint8], cameras: NDArray[np.float64], fields: NDArray[np.uint8]) -> Sketches:

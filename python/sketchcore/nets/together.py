@@ -11,28 +11,12 @@ import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 from itertools import takewhile
-from typing import Protocol
 
-import torch
-from torch import Tensor
+import numpy as np
 
+from sketchcore.nets.cells import Cells
+from sketchcore.nets.passes import Passes, Reading
 from sketchcore.nets.sketches import Sketches
-
-
-class Passes(Protocol):
-    """What a reconstruction asks of the compact network (`CompactInference` says what each returns)."""
-
-    def evidence(self, samples: Sequence[Sketches]) -> Tensor:
-        """What the drawings of each object say by themselves."""
-        ...
-
-    def read(self, samples: Sequence[Sketches], evidence: Tensor) -> Tensor:
-        """What does not change from round to round."""
-        ...
-
-    def decide(self, readings: Tensor, prior: Tensor | None, counts: Sequence[int]) -> Tensor:
-        """Occupancy from what was read and a prior."""
-        ...
 
 
 class Watched:
@@ -46,15 +30,11 @@ class Watched:
     def __init__(self, passes: Passes, check: Callable[[], None]) -> None:
         self._passes, self._check = passes, check
 
-    def evidence(self, samples: Sequence[Sketches]) -> Tensor:
+    def read(self, samples: Sequence[Sketches]) -> list[Reading]:
         self._check()
-        return self._passes.evidence(samples)
+        return self._passes.read(samples)
 
-    def read(self, samples: Sequence[Sketches], evidence: Tensor) -> Tensor:
-        self._check()
-        return self._passes.read(samples, evidence)
-
-    def decide(self, readings: Tensor, prior: Tensor | None, counts: Sequence[int]) -> Tensor:
+    def decide(self, readings: Sequence[Reading], prior: Cells | None, counts: Sequence[int]) -> Cells:
         self._check()
         return self._passes.decide(readings, prior, counts)
 
@@ -62,9 +42,9 @@ class Watched:
 class _Asked:
     """A pass that somebody waits for: in the end, an answer or an error."""
 
-    def __init__(self, readings: Tensor, prior: Tensor | None, counts: Sequence[int]) -> None:
-        self.readings, self.prior, self.counts = readings, prior, list(counts)
-        self.answer: Tensor | None = None
+    def __init__(self, readings: Sequence[Reading], prior: Cells | None, counts: Sequence[int]) -> None:
+        self.readings, self.prior, self.counts = list(readings), prior, list(counts)
+        self.answer: Cells | None = None
         self.error: BaseException | None = None
 
     @property
@@ -94,13 +74,10 @@ class Together:
         self._asked: deque[_Asked] = deque()
         self._busy = False
 
-    def evidence(self, samples: Sequence[Sketches]) -> Tensor:
-        return self._passes.evidence(samples)
+    def read(self, samples: Sequence[Sketches]) -> list[Reading]:
+        return self._passes.read(samples)
 
-    def read(self, samples: Sequence[Sketches], evidence: Tensor) -> Tensor:
-        return self._passes.read(samples, evidence)
-
-    def decide(self, readings: Tensor, prior: Tensor | None, counts: Sequence[int]) -> Tensor:
+    def decide(self, readings: Sequence[Reading], prior: Cells | None, counts: Sequence[int]) -> Cells:
         mine = _Asked(readings, prior, counts)
         with self._turn:
             self._asked.append(mine)
@@ -136,15 +113,15 @@ class Together:
             self._asked.popleft()
         return some
 
-    @torch.inference_mode()
     def _make(self, some: list[_Asked]) -> None:
         try:
-            readings = torch.cat([one.readings for one in some])
+            readings = [reading for one in some for reading in one.readings]
             priors = [one.prior for one in some if one.prior is not None]
             counts = [count for one in some for count in one.counts]
-            answers = self._passes.decide(readings, torch.cat(priors) if priors else None, counts)
-            for one, answer in zip(some, torch.split(answers, [len(one.counts) for one in some]), strict=True):
-                one.answer = answer
+            answers = self._passes.decide(readings, np.concatenate(priors) if priors else None, counts)
+            ends = np.cumsum([len(one.counts) for one in some])
+            for one, end in zip(some, ends, strict=True):
+                one.answer = answers[end - len(one.counts) : end]
         except BaseException as error:
             if len(some) == 1:
                 some[0].error = error

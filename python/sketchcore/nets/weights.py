@@ -1,22 +1,20 @@
-"""Weights on disk: `NAME.safetensors` with the config that rebuilds their network beside it, `NAME.json`.
+"""Weights from disk: `NAME.safetensors` with the config that rebuilds their network beside it, `NAME.json`.
 
-Nothing is ever pickled, so opening a stranger's weights runs no code of theirs.
+Nothing is ever pickled, so opening a stranger's weights runs no code of theirs. `nets/storing.py` writes them.
 """
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, cast
 
-import torch
-from safetensors.torch import load_file, save
-from torch import Tensor
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import deserialize
 
-from sketchcore.atomic import replacing
 from sketchcore.untrusted import check_size, parse_json, reason
 
 SUFFIX = ".safetensors"
@@ -28,77 +26,33 @@ MAX_HEADER = 2**24
 """Bytes of its header, which says what tensors there are."""
 MAX_CONFIG = 2**20
 """Bytes of the config."""
-_STORED = (
-    torch.float16,
-    torch.bfloat16,
-    torch.float32,
-    torch.float64,
-    torch.int64,
-    torch.int32,
-    torch.uint8,
-    torch.bool,
-)
+_STORED = {
+    "F16": np.float16,
+    "BF16": np.uint16,  # the upper half of a float32, which NumPy does not know
+    "F32": np.float32,
+    "F64": np.float64,
+    "I64": np.int64,
+    "I32": np.int32,
+    "U8": np.uint8,
+    "BOOL": np.bool_,
+}
 
 
-def save_weights(
-    path: str | os.PathLike[str],
-    state_dict: Mapping[str, Tensor],
-    config: Mapping[str, Any],
-    dtype: torch.dtype | None = torch.float16,
-) -> None:
-    """Write weights and their config; each file appears whole or not at all.
-
-    Stored are all tensors of the state dict under their names: floating-point ones (weights, biases, running
-    statistics) rounded to `dtype`, integer buffers (`num_batches_tracked`) as they are. The config becomes
-    UTF-8 JSON in the file of the same stem that ends in .json; its tuples come back as lists. The config is
-    replaced first, then the weights.
-
-    Args:
-        path: file to write, ending in .safetensors, in a folder that exists.
-        state_dict: tensors by name, on any device, in any memory layout.
-        config: what rebuilds the network; JSON values only.
-        dtype: floating-point type to store (float16, bfloat16, ...); None keeps each tensor's own.
-
-    Raises:
-        ValueError: if the suffix is wrong, the dtype is no floating-point type, a weight is not finite or too
-            large for the dtype, or the config holds a NaN or an infinite number. Nothing is written then.
-        TypeError: if the config holds what JSON cannot. Nothing is written then.
-        FileNotFoundError: if the folder does not exist.
-    """
-    path = _checked(path)
-    if dtype is not None and not dtype.is_floating_point:
-        raise ValueError(f"weights are stored in a floating-point dtype or None, got {dtype}")
-    text = json.dumps(dict(config), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-    stored = {
-        name: tensor.detach().to(
-            "cpu",
-            dtype if tensor.is_floating_point() else None,
-            copy=True,  # tied weights are stored twice: safetensors refuses shared memory
-            memory_format=torch.contiguous_format,
-        )
-        for name, tensor in state_dict.items()
-    }
-    _refuse_non_finite(stored, f"to be stored as {dtype or 'they are'}")
-    with replacing(path) as weights, replacing(path.with_suffix(".json")) as beside:
-        beside.write_bytes(text.encode())  # both fit on the disk, or neither takes its place
-        weights.write_bytes(save(stored))
-
-
-def load_weights(path: str | os.PathLike[str]) -> tuple[dict[str, Tensor], dict[str, Any]]:
-    """Read what `save_weights` wrote.
+def load_weights(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Reads what `save_weights` wrote. torch is not imported.
 
     Args:
         path: the .safetensors file; its config is looked for beside it.
 
     Returns:
-        The state dict on the CPU, floating-point tensors as float32 and integer ones as stored; the config.
+        The arrays of the state dict by name, floating-point ones as float32 and integer ones as stored; the config.
 
     Raises:
         FileNotFoundError: if the weights or their config are missing.
         ValueError: if the suffix is wrong, either file is truncated, corrupt, of another kind or too large (weights
             2 GiB, their header 16 MiB, the config 1 MiB), or a weight is not finite.
     """
-    path = _checked(path)
+    path = checked_path(path)
     config_path = path.with_suffix(".json")
     if not path.is_file():
         raise FileNotFoundError(f"no weights at {path}")
@@ -109,41 +63,48 @@ def load_weights(path: str | os.PathLike[str]) -> tuple[dict[str, Tensor], dict[
     config = parse_json(config_path.read_bytes(), f"config {config_path}")
     if not isinstance(config, dict):
         raise ValueError(f"config {config_path} must be a JSON object, got {type(config).__name__}")
-    stored = _tensors(path)
-    _refuse_non_finite(stored, f"in {path}")
-    return {name: _widened(stored.pop(name)) for name in list(stored)}, config
+    arrays = _arrays(path)
+    refuse_non_finite((name for name, array in arrays.items() if not np.isfinite(array).all()), f"in {path}")
+    return arrays, config
 
 
-def _tensors(path: Path) -> dict[str, Tensor]:
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
     damaged = f"weights {path} are truncated, corrupt or no safetensors file"
     with path.open("rb") as file:
         if int.from_bytes(file.read(8), "little") > MAX_HEADER:
             raise ValueError(f"{damaged}: their header would have more than {MAX_HEADER // 2**20} MiB")
     try:
-        stored: dict[str, Tensor] = load_file(path)
+        stored = deserialize(path.read_bytes())  # type: ignore[no-untyped-call]
     except MemoryError:
         raise
-    except Exception as error:  # what dtypes and sizes torch cannot have, it says in its own ways
+    except Exception as error:  # what is wrong with a file, the library says in its own ways
         raise ValueError(f"{damaged}: {reason(error)}") from error
-    for name, tensor in stored.items():
-        if tensor.dtype not in _STORED:
-            raise ValueError(f"weights {path} hold {name[:80]} as {tensor.dtype}; networks have float16 to float64")
-    return stored
+    arrays = {}
+    for name, entry in stored:
+        dtype = _STORED.get(entry["dtype"])
+        if dtype is None:
+            raise ValueError(f"weights {path} hold {name[:80]} as {entry['dtype']}; networks have F16 to F64")
+        array = np.frombuffer(entry["data"], dtype).reshape(entry["shape"])
+        if entry["dtype"] == "BF16":
+            array = (array.astype(np.uint32) << 16).view(np.float32)
+        arrays[name] = array.astype(np.float32 if array.dtype.kind == "f" else array.dtype)
+    return arrays
 
 
-def _widened(tensor: Tensor) -> Tensor:
-    return tensor.float() if tensor.is_floating_point() else tensor
+def checked_path(path: str | os.PathLike[str]) -> Path:
+    """The path of weights.
 
-
-def _checked(path: str | os.PathLike[str]) -> Path:
+    Raises:
+        ValueError: if its suffix is another one.
+    """
     path = Path(path)
     if path.suffix != SUFFIX:
         raise ValueError(f"weights are stored as {SUFFIX}, got {path.name!r}")
     return path
 
 
-def _refuse_non_finite(tensors: Mapping[str, Tensor], where: str) -> None:
-    bad = sorted(name for name, t in tensors.items() if t.is_floating_point() and not t.isfinite().all())
-    if bad:
+def refuse_non_finite(names: Iterable[str], where: str) -> None:
+    """Raises a ValueError that names the weights with such entries, if there are any."""
+    if bad := sorted(names):
         more = f" and {len(bad) - 3} more" if len(bad) > 3 else ""
         raise ValueError(f"weights {where} have NaN or infinite entries: {', '.join(bad[:3])}{more}")

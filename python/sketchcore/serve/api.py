@@ -20,7 +20,7 @@ from sketchcore.asgi.files import MEDIA_TYPES, OTHER, attachment
 from sketchcore.asgi.guard import Guard, TooLargeError
 from sketchcore.asgi.sentences import error_response
 from sketchcore.camera import VIEWPOINTS
-from sketchcore.nets.models import Model
+from sketchcore.nets.model import Model
 from sketchcore.serve.order import AbandonedError, Made, Order
 from sketchcore.serve.service import BusyError, Limits, Service
 from sketchcore.serve.views import Pinhole, read_view, told

@@ -16,8 +16,10 @@ from PIL import Image
 from sketchcore.asgi.guard import TooLargeError
 from sketchcore.camera import Camera
 from sketchcore.drawing import FORMATS
-from sketchcore.nets.models import CompactModel, Model
-from sketchcore.nets.together import Passes, Watched
+from sketchcore.nets.compactmodel import CompactModel
+from sketchcore.nets.model import Model
+from sketchcore.nets.passes import Passes
+from sketchcore.nets.together import Watched
 from sketchcore.reconstruction import Reconstruction, reconstruct
 from sketchcore.serve.views import Pinhole
 
@@ -70,7 +72,7 @@ def make(order: Order, model: Model, passes: Passes | None, check: Callable[[], 
     """
     images = [_opened(data, number, order.megapixels) for number, data in enumerate(order.drawings, 1)]
     if isinstance(model, CompactModel):
-        model = model.by(Watched(passes or model.net, check))
+        model = model.by(Watched(passes or model.passes, check))
     solid = reconstruct(
         images,
         list(order.views) or None,

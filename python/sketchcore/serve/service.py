@@ -1,8 +1,8 @@
 """How many requests are served at a time, how many wait, and for how long.
 
 A request has a seat from before its body is read until it is answered; where all are taken, it is refused at once, and
-told when to come again. So neither memory nor waiting grows without end. Workers are threads: torch and the kernels let
-others run while they compute.
+told when to come again. So neither memory nor waiting grows without end. Workers are threads: the kernels let others
+run while they compute, and share the cores among themselves.
 """
 
 from __future__ import annotations
@@ -19,11 +19,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 
-import torch
-
 from sketchcore.camera import VIEWPOINTS
 from sketchcore.grids import draw
-from sketchcore.nets.models import CompactModel, Model
+from sketchcore.nets.compactmodel import CompactModel
+from sketchcore.nets.model import Model
 from sketchcore.nets.together import Together
 from sketchcore.reconstruction import reconstruct
 from sketchcore.serve.order import AbandonedError, Made, Order, make
@@ -101,10 +100,7 @@ class Service:
         self.warm = False
         self._model = model
         together = isinstance(model, CompactModel) and limits.batch > 1
-        self._passes = Together(model.net, limits.batch) if together and isinstance(model, CompactModel) else None
-        self._threads = torch.get_num_threads()
-        if self._passes is None:  # workers share the cores; passes that are put together have them all
-            torch.set_num_threads(max(1, self._threads // limits.workers))
+        self._passes = Together(model.passes, limits.batch) if together and isinstance(model, CompactModel) else None
         self._closed = threading.Event()
         self._pool = ThreadPoolExecutor(limits.workers, "reconstruct")
         self._work = 1.0
@@ -181,4 +177,3 @@ class Service:
         """Ends the workers: what is still waiting is dropped, what runs ends at its next pass."""
         self._closed.set()
         self._pool.shutdown(cancel_futures=True)
-        torch.set_num_threads(self._threads)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import torch
 from torch import Tensor
 
 from sketchcore.nets.weights import PRETRAINED, load_weights
@@ -36,7 +37,8 @@ def read_beginning(path: Path, preset: Preset) -> Beginning:
         FileNotFoundError: if there are none.
         ValueError: if they are no weights, or another network's than the preset's.
     """
-    state, config = load_weights(PRETRAINED if path == Path("pretrained") else path)
+    weights, config = load_weights(PRETRAINED if path == Path("pretrained") else path)
+    state = {name: torch.from_numpy(array) for name, array in weights.items()}
     if config.get("network") != preset.network:
         raise ValueError(
             f"{path} holds a network {config.get('network')!r}, and this preset trains {preset.network!r}; "

@@ -19,8 +19,10 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from sketchcore.datagen.prepared import Prepared
-from sketchcore.nets.compact import CompactConfig, CompactNet, read_inputs
-from sketchcore.nets.models import CompactModel
+from sketchcore.nets.compact import CompactNet, read_inputs
+from sketchcore.nets.compactmodel import CompactModel
+from sketchcore.nets.config import CompactConfig
+from sketchcore.nets.loading import passes_of
 from sketchcore.nets.precision import autocast, place, unit
 from sketchcore.nets.sketches import Sketches
 from sketchcore.train.ahead import Ahead
@@ -186,7 +188,7 @@ class ChainStage:
     def measure(self, net: nn.Module) -> float:
         """The held-out IoU of a network like the model: from one drawing and from three, after a round."""
         assert isinstance(net, CompactNet)
-        model = CompactModel(net, self._device)
+        model = CompactModel(passes_of(net, self._device))
         scores = heldout_iou(model, views=(1, 3), grammar=self._grammar, data=self._data)
         return sum(scores) / len(scores)
 

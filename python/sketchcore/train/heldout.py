@@ -8,7 +8,7 @@ import numpy as np
 
 from sketchcore.datagen.generate import generate
 from sketchcore.datagen.prepared import Prepared
-from sketchcore.nets.models import Model
+from sketchcore.nets.model import Model
 from sketchcore.nets.sketches import Sketches
 from sketchcore.volume import iou
 

@@ -14,10 +14,11 @@ from torch import Tensor, nn
 
 from sketchcore.atomic import sweep
 from sketchcore.datagen.prepared import Prepared
-from sketchcore.nets.compact import CompactConfig, CompactNet
+from sketchcore.nets.compact import CompactNet
+from sketchcore.nets.config import CompactConfig
 from sketchcore.nets.multiscale import MultiscaleNet
+from sketchcore.nets.storing import save_weights
 from sketchcore.nets.unet import PaperNet
-from sketchcore.nets.weights import save_weights
 from sketchcore.train.bar import TrainingBar
 from sketchcore.train.beginning import read_beginning
 from sketchcore.train.chains import ChainStage

@@ -16,8 +16,8 @@ from torch import Tensor, nn
 from sketchcore import _core
 from sketchcore.datagen.generate import Batch
 from sketchcore.datagen.prepared import Prepared
-from sketchcore.nets.models import PaperModel
 from sketchcore.nets.multiscale import MultiscaleNet
+from sketchcore.nets.papermodel import PaperModel
 from sketchcore.nets.precision import autocast, place, unit
 from sketchcore.nets.singleview import SingleViewModel, SingleViewNet
 from sketchcore.nets.unet import PaperNet, paper_loss
