@@ -6,7 +6,7 @@
 
 use super::memory::{Aligned, with_scratch};
 use super::product::{Panels, PanelsRef, Rows, Target, fill, multiply_panels};
-use super::tiles::{Backward, Forward, Grid, Spread};
+use super::tiles::{Backward, Forward, Grid, Shared, Spread};
 use super::transform::{Four, One, Two, filter_rows};
 use super::vector::Instructions;
 use rayon::prelude::*;
@@ -27,6 +27,8 @@ pub(super) struct Winograd {
     filters: Aligned,
     /// Made up to whole vectors.
     bias: Aligned,
+    /// What a tile reads outside the grid.
+    zeros: Aligned,
 }
 
 /// Calls a task of three axes for the tiles that it is compiled for.
@@ -34,6 +36,7 @@ macro_rules! for_tiles {
     ($self:ident, $task:ident { $($fields:tt)* }) => {
         match $self.tile {
             [4, 4, 2] => $self.instructions.run($task::<Four, Four, Two> { $($fields)*, axes: PhantomData }),
+            [4, 4, 4] => $self.instructions.run($task::<Four, Four, Four> { $($fields)*, axes: PhantomData }),
             [2, 2, 2] => $self.instructions.run($task::<Two, Two, Two> { $($fields)*, axes: PhantomData }),
             [4, 4, 1] => $self.instructions.run($task::<Four, Four, One> { $($fields)*, axes: PhantomData }),
             [2, 2, 1] => $self.instructions.run($task::<Two, Two, One> { $($fields)*, axes: PhantomData }),
@@ -49,7 +52,7 @@ impl Winograd {
         match (axes, inputs * outputs <= 128 * 128) {
             (2, true) => [4, 4, 1],
             (2, false) => [2, 2, 1],
-            (_, true) => [4, 4, 2],
+            (_, true) => [4, 4, 4],
             (_, false) => [2, 2, 2],
         }
     }
@@ -78,7 +81,16 @@ impl Winograd {
         }
         let mut wide_bias = Aligned::zeros(width);
         wide_bias[..bias.len()].copy_from_slice(bias);
-        Self { instructions, inputs, outputs, tile, frequencies, filters, bias: wide_bias }
+        Self {
+            instructions,
+            inputs,
+            outputs,
+            tile,
+            frequencies,
+            filters,
+            bias: wide_bias,
+            zeros: Aligned::zeros(inputs),
+        }
     }
 
     pub fn apply(&self, input: &[f32], size: [usize; 3], rectify: bool, add: bool, out: &mut [f32]) {
@@ -87,7 +99,7 @@ impl Winograd {
         let at_once = (AT_ONCE / (self.frequencies * (wide_in + wide_out))).max(1);
         let in_layer = self.tile[0] * size[1] * size[2] * self.outputs;
         let threads = rayon::current_num_threads();
-        if self.filters.len() > 2 * AT_ONCE || grid.tiles[0] < threads {
+        if self.filters.len() > (1 << 19) || grid.tiles[0] < threads {
             return self.by_frequency(grid, input, rectify, add, out);
         }
         // A few layers of tiles for each task, about as many tiles as are worked on at a time.
@@ -105,7 +117,15 @@ impl Winograd {
                 for block in 0..blocks {
                     let at = |block: usize| tiles.start + tiles.len() * block / blocks;
                     let range = at(block)..at(block + 1);
-                    self.forward(grid, input, rectify, range.clone(), before, values);
+                    self.forward(
+                        grid,
+                        input,
+                        rectify,
+                        range.clone(),
+                        range.start,
+                        before,
+                        Shared::new(values),
+                    );
                     for f in 0..self.frequencies {
                         let rows = Rows {
                             values: &values[f * before.frequency..],
@@ -125,24 +145,22 @@ impl Winograd {
 
     fn by_frequency(&self, grid: Grid, input: &[f32], rectify: bool, add: bool, out: &mut [f32]) {
         let (wide_in, wide_out) = self.widths();
-        let (each, layers) = (grid.in_layer(), grid.tiles[0]);
-        let (before, after) = (Spread::new(each, wide_in), Spread::new(each * layers, wide_out));
-        let of_layer = self.frequencies * before.frequency;
-        let split = layers * of_layer;
+        let (each, tiles) = (grid.in_layer(), grid.in_layer() * grid.tiles[0]);
+        let (before, after) = (Spread::new(tiles, wide_in), Spread::new(tiles, wide_out));
+        let split = self.frequencies * before.frequency;
         with_scratch(split + self.frequencies * after.frequency, |scratch| {
             let (values, products) = scratch.split_at_mut(split);
-            values.par_chunks_exact_mut(of_layer).enumerate().for_each(|(layer, values)| {
-                let tiles = layer * each..(layer + 1) * each;
-                self.forward(grid, input, rectify, tiles, before, values);
+            let shared = Shared::new(values);
+            let share = tiles.div_ceil(4 * rayon::current_num_threads());
+            (0..tiles.div_ceil(share)).into_par_iter().for_each(|nth| {
+                let tiles = nth * share..((nth + 1) * share).min(tiles);
+                self.forward(grid, input, rectify, tiles, 0, before, shared);
             });
             products.par_chunks_exact_mut(after.frequency).enumerate().for_each(|(f, products)| {
-                for layer in 0..layers {
-                    let values = &values[layer * of_layer + f * before.frequency..];
-                    let rows = Rows { values, stride: before.tile, count: each };
-                    let values = &mut products[layer * each * after.tile..];
-                    let target = Target { values, stride: after.tile, add: false, bias: &[] };
-                    multiply_panels(rows, self.filter(f), target);
-                }
+                let rows =
+                    Rows { values: &values[f * before.frequency..], stride: before.tile, count: tiles };
+                let target = Target { values: products, stride: after.tile, add: false, bias: &[] };
+                multiply_panels(rows, self.filter(f), target);
             });
             let in_layer = self.tile[0] * grid.size[1] * grid.size[2] * self.outputs;
             out.par_chunks_mut(in_layer).enumerate().for_each(|(layer, out)| {
@@ -165,17 +183,19 @@ impl Winograd {
         PanelsRef { depth: self.inputs, columns, instructions: self.instructions, values }
     }
 
+    #[allow(clippy::too_many_arguments)]
     fn forward(
         &self,
         grid: Grid,
         input: &[f32],
         rectify: bool,
         tiles: Range<usize>,
+        first: usize,
         spread: Spread,
-        out: &mut [f32],
+        out: Shared,
     ) {
-        let channels = self.inputs;
-        for_tiles!(self, Forward { grid, input, channels, rectify, tiles, spread, out });
+        let (channels, zeros) = (self.inputs, &self.zeros[..]);
+        for_tiles!(self, Forward { grid, input, channels, rectify, tiles, spread, zeros, first, out });
     }
 
     #[allow(clippy::too_many_arguments)]
@@ -191,7 +211,12 @@ impl Winograd {
         out: &mut [f32],
     ) {
         let (channels, bias) = (self.outputs, &self.bias[..]);
-        for_tiles!(self, Backward { grid, products, first, spread, tiles, channels, bias, add, layer, out });
+        with_scratch(channels, |waste| {
+            for_tiles!(
+                self,
+                Backward { grid, products, first, spread, tiles, channels, bias, add, layer, out, waste }
+            );
+        });
     }
 }
 
