@@ -91,7 +91,7 @@ unsafe fn locate<const N: usize>(
 }
 
 /// The most cells of a tile.
-const CELLS: usize = WIDEST * WIDEST * WIDEST;
+pub(super) const CELLS: usize = WIDEST * WIDEST * WIDEST;
 /// The most cells of a tile across the first axis.
 const ACROSS: usize = WIDEST * WIDEST;
 

@@ -5,10 +5,11 @@
 //! all tiles are transformed first, and threads share out the frequencies, so that each filter is read once.
 
 use super::memory::{Aligned, with_scratch};
-use super::product::{Panels, PanelsRef, Rows, Target, fill, multiply_panels};
-use super::tiles::{Backward, Forward, Grid, Shared, Spread};
+use super::product::{ACROSS, Panels, PanelsRef, Rows, Target, multiply_panels};
+use super::tiles::{Backward, CELLS, Forward, Grid, Shared, Spread};
 use super::transform::{Four, One, Two, filter_rows};
 use super::vector::Instructions;
+use crate::dispatch::for_each_instruction_set;
 use rayon::prelude::*;
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -35,7 +36,6 @@ pub(super) struct Winograd {
 macro_rules! for_tiles {
     ($self:ident, $task:ident { $($fields:tt)* }) => {
         match $self.tile {
-            [4, 4, 2] => $self.instructions.run($task::<Four, Four, Two> { $($fields)*, axes: PhantomData }),
             [4, 4, 4] => $self.instructions.run($task::<Four, Four, Four> { $($fields)*, axes: PhantomData }),
             [2, 2, 2] => $self.instructions.run($task::<Two, Two, Two> { $($fields)*, axes: PhantomData }),
             [4, 4, 1] => $self.instructions.run($task::<Four, Four, One> { $($fields)*, axes: PhantomData }),
@@ -46,14 +46,14 @@ macro_rules! for_tiles {
 }
 
 impl Winograd {
-    /// Large tiles spare more products and need larger filters: where there are many channels, grids have few cells,
-    /// and reading the filters would take longer than the products.
+    /// Large tiles spare products and need large filters: those of 192 x 192 channels take 9 MB in tiles of two, and 32
+    /// in tiles of four. Where there are so many channels grids have few cells, and it takes longer to read them.
     pub fn tile(inputs: usize, outputs: usize, axes: usize) -> [usize; 3] {
-        match (axes, inputs * outputs <= 128 * 128) {
-            (2, true) => [4, 4, 1],
-            (2, false) => [2, 2, 1],
-            (_, true) => [4, 4, 4],
-            (_, false) => [2, 2, 2],
+        match (axes, inputs * outputs) {
+            (2, ..=40_000) => [4, 4, 1],
+            (2, _) => [2, 2, 1],
+            (_, ..=20_000) => [4, 4, 4],
+            (_, _) => [2, 2, 2],
         }
     }
 
@@ -66,19 +66,16 @@ impl Winograd {
         outputs: usize,
         tile: [usize; 3],
     ) -> Self {
-        let transformed = transform_filters(weight, tile);
         let frequencies = tile.iter().map(|&t| filter_rows(t).len()).product();
         let width = Panels::width(instructions, outputs);
         let mut filters = Aligned::zeros(frequencies * inputs * width);
-        if inputs * width > 0 {
-            for (f, panels) in filters.chunks_exact_mut(inputs * width).enumerate() {
-                let filter = &transformed[f * inputs * outputs..][..inputs * outputs];
-                // Columns that fill up vectors are computed as well: they have a place among the products.
-                fill(instructions, inputs, width, panels, |i, o| {
-                    if o < outputs { filter[o * inputs + i] } else { 0.0 }
-                });
-            }
-        }
+        transform_filters(
+            weight,
+            tile,
+            [inputs, outputs, width],
+            ACROSS * instructions.lanes(),
+            &mut filters,
+        );
         let mut wide_bias = Aligned::zeros(width);
         wide_bias[..bias.len()].copy_from_slice(bias);
         Self {
@@ -220,29 +217,55 @@ impl Winograd {
     }
 }
 
-/// Filters of three taps an axis as frequencies: frequency x filter. Of an axis of tiles of one cell, they have one tap.
-fn transform_filters(weight: &[f32], tile: [usize; 3]) -> Vec<f32> {
-    let [a, b, c] = tile.map(filter_rows);
-    let taps = [a, b, c].map(|rows| rows[0].len());
-    let filters = weight.len() / taps.iter().product::<usize>();
-    let mut out = vec![0.0; a.len() * b.len() * c.len() * filters];
-    for (f, filter) in weight.chunks_exact(taps.iter().product()).enumerate() {
-        let mut values: Vec<f64> = filter.iter().map(|&w| f64::from(w)).collect();
-        // The first axis is transformed and made the last, three times.
-        for rows in [a, b, c] {
-            let rest = values.len() / rows[0].len();
-            let mut next = vec![0.0; rest * rows.len()];
-            for (i, row) in rows.iter().enumerate() {
-                for r in 0..rest {
-                    next[r * rows.len() + i] =
-                        row.iter().enumerate().map(|(tap, factor)| factor * values[tap * rest + r]).sum();
-                }
+/// Most columns of a panel.
+const WIDEST_PANEL: usize = 32;
+
+for_each_instruction_set! {
+/// Makes filters of three taps an axis (along axes with tiles of one cell, of one) into panels, `panel` columns wide at
+/// most, frequency by frequency. Columns beyond `outputs` up to `width` are left as they are.
+fn transform_filters(
+    weight: &[f32],
+    tile: [usize; 3],
+    [inputs, outputs, width]: [usize; 3],
+    panel: usize,
+    out: &mut [f32],
+) {
+    let rows = tile.map(filter_rows);
+    let taps: usize = rows.iter().map(|rows| rows[0].len()).product();
+    // Filters of one input and the outputs of a panel, side by side.
+    let mut values = vec![[0.0; WIDEST_PANEL]; CELLS];
+    let mut next = values.clone();
+    for first in (0..outputs).step_by(panel) {
+        let across = panel.min(width - first);
+        let columns = panel.min(outputs - first);
+        for input in 0..inputs {
+            for column in 0..columns {
+                let filter = &weight[((first + column) * inputs + input) * taps..][..taps];
+                values.iter_mut().zip(filter).for_each(|(values, &w)| values[column] = f64::from(w));
             }
-            values = next;
-        }
-        for (frequency, value) in values.into_iter().enumerate() {
-            out[frequency * filters + f] = value as f32;
+            // The first axis is transformed and made the last, three times.
+            let mut count = taps;
+            for rows in rows {
+                let rest = count / rows[0].len();
+                for (i, row) in rows.iter().enumerate() {
+                    for r in 0..rest {
+                        let mut sums = [0.0; WIDEST_PANEL];
+                        for (tap, factor) in row.iter().enumerate() {
+                            let values = &values[tap * rest + r];
+                            sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
+                        }
+                        next[r * rows.len() + i] = sums;
+                    }
+                }
+                count = rest * rows.len();
+                std::mem::swap(&mut values, &mut next);
+            }
+            for (frequency, values) in values[..count].iter().enumerate() {
+                let start = (frequency * width + first) * inputs + input * across;
+                let to = out[start..][..columns].iter_mut();
+                to.zip(values).for_each(|(to, &value)| *to = value as f32);
+            }
         }
     }
-    out
+}
 }
