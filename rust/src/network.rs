@@ -13,6 +13,7 @@ mod encoder;
 mod exponential;
 mod norm;
 mod reading;
+mod spare;
 pub mod weights;
 pub mod widths;
 
@@ -24,6 +25,7 @@ use decoder::Decoder;
 use encoder::Encoder;
 use reading::Reading;
 pub use reading::{BYTES as EVIDENCE_BYTES, VOXELS};
+use spare::Spare;
 use weights::Weights;
 use widths::Widths;
 
@@ -33,6 +35,9 @@ pub struct CompactNetwork {
     reading: Reading,
     decoder: Decoder,
     outputs: usize,
+    /// What drawings are read in: an encoder's room, and what cells have read.
+    readers: Spare<(encoder::Room, Vec<f32>)>,
+    deciders: Spare<decoder::Room>,
 }
 
 impl CompactNetwork {
@@ -45,7 +50,8 @@ impl CompactNetwork {
         let (decoder, first) = Decoder::of(&mut weights, widths)?;
         weights.finish()?;
         let reading = Reading::new(each, &first.weight, &first.bias, widths);
-        Ok(Self { encoder, reading, decoder, outputs: first.bias.len() })
+        let (outputs, readers, deciders) = (first.bias.len(), Spare::new(), Spare::new());
+        Ok(Self { encoder, reading, decoder, outputs, readers, deciders })
     }
 
     /// Numbers of each cell that `read` makes and `decide` takes.
@@ -76,20 +82,22 @@ impl CompactNetwork {
             return Err(CoreError::Counts { counts: counts.to_vec(), drawings: cameras.len() });
         }
         let known: Vec<Camera> = cameras.iter().map(Camera::from_packed).collect::<Result<_, _>>()?;
-        let (mut room, mut seen) = (self.encoder.room(), self.reading.room());
         let mut out = vec![0.0; counts.len() * HALF * self.outputs];
-        let mut next = 0;
         let objects = out.chunks_exact_mut(HALF * self.outputs).zip(evidence.chunks_exact(EVIDENCE_BYTES));
-        for (&count, (out, evidence)) in counts.iter().zip(objects) {
-            for i in next..next + count {
-                let (drawing, fields) = (&drawings[i * IMAGE * IMAGE..], &fields[i * FIELDS..]);
-                let rotation = std::array::from_fn(|entry| cameras[i][3 + entry] as f32);
-                self.encoder.apply(&drawing[..IMAGE * IMAGE], &fields[..FIELDS], &rotation, &mut room);
-                self.reading.add(&known[i], &room.features, i == next, &mut seen);
+        let make = || (self.encoder.room(), self.reading.room());
+        self.readers.with(make, |(room, seen)| {
+            let mut next = 0;
+            for (&count, (out, evidence)) in counts.iter().zip(objects) {
+                for i in next..next + count {
+                    let (drawing, fields) = (&drawings[i * IMAGE * IMAGE..], &fields[i * FIELDS..]);
+                    let rotation = std::array::from_fn(|entry| cameras[i][3 + entry] as f32);
+                    self.encoder.apply(&drawing[..IMAGE * IMAGE], &fields[..FIELDS], &rotation, room);
+                    self.reading.add(&known[i], &room.features, i == next, seen);
+                }
+                self.reading.finish(seen, count, evidence, out);
+                next += count;
             }
-            self.reading.finish(&seen, count, evidence, out);
-            next += count;
-        }
+        });
         Ok(out)
     }
 
@@ -107,13 +115,17 @@ impl CompactNetwork {
         assert_eq!(readings.len(), counts.len() * HALF * self.outputs);
         assert!(prior.is_none_or(|prior| prior.len() == counts.len() * HALF * VOXELS));
         check_counts(counts)?;
-        let mut room = self.decoder.room();
         let mut out = vec![0.0; counts.len() * HALF * VOXELS];
         let objects = out.chunks_exact_mut(HALF * VOXELS).zip(readings.chunks_exact(HALF * self.outputs));
-        for (i, (&count, (out, readings))) in counts.iter().zip(objects).enumerate() {
-            let prior = prior.map(|prior| &prior[i * HALF * VOXELS..][..HALF * VOXELS]);
-            self.decoder.apply(readings, prior, count, &mut room, out);
-        }
+        self.deciders.with(
+            || self.decoder.room(),
+            |room| {
+                for (i, (&count, (out, readings))) in counts.iter().zip(objects).enumerate() {
+                    let prior = prior.map(|prior| &prior[i * HALF * VOXELS..][..HALF * VOXELS]);
+                    self.decoder.apply(readings, prior, count, room, out);
+                }
+            },
+        );
         Ok(out)
     }
 }

@@ -1,13 +1,17 @@
 //! Products of matrices: rows of one by columns of another that lie in panels.
 
 use super::memory::Aligned;
-use super::vector::{Instructions, Task, Vector};
+use super::vector::{Instructions, Task, Vector, prefetch};
 
 /// Vectors across a panel.
-const ACROSS: usize = 2;
+pub(super) const ACROSS: usize = 2;
 /// Rows of a panel that are multiplied at a time, so that they stay in the nearest cache: those of 32 columns take
 /// 32 KB.
 const DEPTH: usize = 256;
+
+/// How far ahead of the products panels are fetched, in floats: a few hundred products, which takes about as long as
+/// the way from the last cache.
+const AHEAD: usize = 1024;
 
 /// A matrix of `depth` x `columns`, cut into panels of two vectors of columns. In each, rows follow each other. If one
 /// vector is enough for the last panel, it is as wide as that; columns that it has too many are zeros.
@@ -187,7 +191,11 @@ unsafe fn by_block<V: Vector, const R: usize, const C: usize>(
         let mut sums = [[V::splat(0.0); C]; R];
         let mut line = panel.as_ptr();
         for k in 0..depth {
-            let b: [V; C] = std::array::from_fn(|c| V::load(line.add(c * V::LANES)));
+            let mut b = [V::splat(0.0); C];
+            for (c, b) in b.iter_mut().enumerate() {
+                *b = V::load(line.add(c * V::LANES));
+                prefetch(line.wrapping_add(AHEAD + c * V::LANES));
+            }
             for (r, sums) in sums.iter_mut().enumerate() {
                 let factor = V::splat(*a.add(r * stride + k));
                 for (sum, b) in sums.iter_mut().zip(b) {

@@ -4,9 +4,9 @@ use super::*;
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 
-/// The largest error that is allowed, in units of the largest output that the sizes of inputs and weights make likely:
-/// the root of the number of products. Measured: 4e-6 with the largest tiles.
-const TOLERANCE: f64 = 2e-5;
+/// The largest error that is allowed, in units of the root of the number of products: about three times what an output
+/// amounts to here. 3e-6 was the largest of thousands of layers; so errors are within 1e-5 of a typical output.
+const TOLERANCE: f64 = 1e-5;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
@@ -15,12 +15,11 @@ enum Kind {
     Point,
 }
 
-/// Numbers between -1 and 1.
+/// Numbers between -1 and 1, without any pattern.
 fn noise(count: usize, seed: usize) -> Vec<f32> {
-    let at = |i: usize| {
-        (((i + seed * 7919) as u32).wrapping_mul(2_654_435_761).wrapping_mul(747_796_405) >> 8) as f32
-    };
-    (0..count).map(|i| at(i) / (1 << 23) as f32 - 1.0).collect()
+    let mix = |x: u32, shift: u32, by: u32| (x ^ (x >> shift)).wrapping_mul(by);
+    let at = |i: usize| mix(mix((i + (seed << 24)) as u32, 16, 0x7feb_352d), 15, 0x846c_a68b) ^ 0x5a5a_5a5a;
+    (0..count).map(|i| (mix(at(i), 16, 1) >> 8) as f32 / (1 << 23) as f32 - 1.0).collect()
 }
 
 struct Case {

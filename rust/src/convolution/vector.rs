@@ -29,6 +29,18 @@ pub(super) trait Vector: Copy {
     unsafe fn at_least(self, other: Self) -> Self;
 }
 
+/// Has what lies there, if anything does, on its way to the nearest cache.
+#[inline(always)]
+pub(super) fn prefetch(at: *const f32) {
+    // SAFETY: nothing is read that the program would see.
+    #[cfg(target_arch = "x86_64")]
+    unsafe {
+        _mm_prefetch::<_MM_HINT_T0>(at.cast());
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = at;
+}
+
 /// Implements `Vector` by intrinsics: floats in one, rows, and the names of the instructions.
 #[cfg(target_arch = "x86_64")]
 macro_rules! vector {

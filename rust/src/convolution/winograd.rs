@@ -5,10 +5,11 @@
 //! all tiles are transformed first, and threads share out the frequencies, so that each filter is read once.
 
 use super::memory::{Aligned, with_scratch};
-use super::product::{Panels, PanelsRef, Rows, Target, fill, multiply_panels};
-use super::tiles::{Backward, Forward, Grid, Spread};
+use super::product::{ACROSS, Panels, PanelsRef, Rows, Target, multiply_panels};
+use super::tiles::{Backward, CELLS, Forward, Grid, Shared, Spread};
 use super::transform::{Four, One, Two, filter_rows};
 use super::vector::Instructions;
+use crate::dispatch::for_each_instruction_set;
 use rayon::prelude::*;
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -27,13 +28,15 @@ pub(super) struct Winograd {
     filters: Aligned,
     /// Made up to whole vectors.
     bias: Aligned,
+    /// What a tile reads outside the grid.
+    zeros: Aligned,
 }
 
 /// Calls a task of three axes for the tiles that it is compiled for.
 macro_rules! for_tiles {
     ($self:ident, $task:ident { $($fields:tt)* }) => {
         match $self.tile {
-            [4, 4, 2] => $self.instructions.run($task::<Four, Four, Two> { $($fields)*, axes: PhantomData }),
+            [4, 4, 4] => $self.instructions.run($task::<Four, Four, Four> { $($fields)*, axes: PhantomData }),
             [2, 2, 2] => $self.instructions.run($task::<Two, Two, Two> { $($fields)*, axes: PhantomData }),
             [4, 4, 1] => $self.instructions.run($task::<Four, Four, One> { $($fields)*, axes: PhantomData }),
             [2, 2, 1] => $self.instructions.run($task::<Two, Two, One> { $($fields)*, axes: PhantomData }),
@@ -43,14 +46,14 @@ macro_rules! for_tiles {
 }
 
 impl Winograd {
-    /// Large tiles spare more products and need larger filters: where there are many channels, grids have few cells,
-    /// and reading the filters would take longer than the products.
+    /// Large tiles spare products and need large filters: those of 192 x 192 channels take 9 MB in tiles of two, and 32
+    /// in tiles of four. Where there are so many channels grids have few cells, and it takes longer to read them.
     pub fn tile(inputs: usize, outputs: usize, axes: usize) -> [usize; 3] {
-        match (axes, inputs * outputs <= 128 * 128) {
-            (2, true) => [4, 4, 1],
-            (2, false) => [2, 2, 1],
-            (_, true) => [4, 4, 2],
-            (_, false) => [2, 2, 2],
+        match (axes, inputs * outputs) {
+            (2, ..=40_000) => [4, 4, 1],
+            (2, _) => [2, 2, 1],
+            (_, ..=20_000) => [4, 4, 4],
+            (_, _) => [2, 2, 2],
         }
     }
 
@@ -63,22 +66,28 @@ impl Winograd {
         outputs: usize,
         tile: [usize; 3],
     ) -> Self {
-        let transformed = transform_filters(weight, tile);
         let frequencies = tile.iter().map(|&t| filter_rows(t).len()).product();
         let width = Panels::width(instructions, outputs);
         let mut filters = Aligned::zeros(frequencies * inputs * width);
-        if inputs * width > 0 {
-            for (f, panels) in filters.chunks_exact_mut(inputs * width).enumerate() {
-                let filter = &transformed[f * inputs * outputs..][..inputs * outputs];
-                // Columns that fill up vectors are computed as well: they have a place among the products.
-                fill(instructions, inputs, width, panels, |i, o| {
-                    if o < outputs { filter[o * inputs + i] } else { 0.0 }
-                });
-            }
-        }
+        transform_filters(
+            weight,
+            tile,
+            [inputs, outputs, width],
+            ACROSS * instructions.lanes(),
+            &mut filters,
+        );
         let mut wide_bias = Aligned::zeros(width);
         wide_bias[..bias.len()].copy_from_slice(bias);
-        Self { instructions, inputs, outputs, tile, frequencies, filters, bias: wide_bias }
+        Self {
+            instructions,
+            inputs,
+            outputs,
+            tile,
+            frequencies,
+            filters,
+            bias: wide_bias,
+            zeros: Aligned::zeros(inputs),
+        }
     }
 
     pub fn apply(&self, input: &[f32], size: [usize; 3], rectify: bool, add: bool, out: &mut [f32]) {
@@ -87,7 +96,7 @@ impl Winograd {
         let at_once = (AT_ONCE / (self.frequencies * (wide_in + wide_out))).max(1);
         let in_layer = self.tile[0] * size[1] * size[2] * self.outputs;
         let threads = rayon::current_num_threads();
-        if self.filters.len() > 2 * AT_ONCE || grid.tiles[0] < threads {
+        if self.filters.len() > (1 << 19) || grid.tiles[0] < threads {
             return self.by_frequency(grid, input, rectify, add, out);
         }
         // A few layers of tiles for each task, about as many tiles as are worked on at a time.
@@ -105,7 +114,15 @@ impl Winograd {
                 for block in 0..blocks {
                     let at = |block: usize| tiles.start + tiles.len() * block / blocks;
                     let range = at(block)..at(block + 1);
-                    self.forward(grid, input, rectify, range.clone(), before, values);
+                    self.forward(
+                        grid,
+                        input,
+                        rectify,
+                        range.clone(),
+                        range.start,
+                        before,
+                        Shared::new(values),
+                    );
                     for f in 0..self.frequencies {
                         let rows = Rows {
                             values: &values[f * before.frequency..],
@@ -125,24 +142,22 @@ impl Winograd {
 
     fn by_frequency(&self, grid: Grid, input: &[f32], rectify: bool, add: bool, out: &mut [f32]) {
         let (wide_in, wide_out) = self.widths();
-        let (each, layers) = (grid.in_layer(), grid.tiles[0]);
-        let (before, after) = (Spread::new(each, wide_in), Spread::new(each * layers, wide_out));
-        let of_layer = self.frequencies * before.frequency;
-        let split = layers * of_layer;
+        let (each, tiles) = (grid.in_layer(), grid.in_layer() * grid.tiles[0]);
+        let (before, after) = (Spread::new(tiles, wide_in), Spread::new(tiles, wide_out));
+        let split = self.frequencies * before.frequency;
         with_scratch(split + self.frequencies * after.frequency, |scratch| {
             let (values, products) = scratch.split_at_mut(split);
-            values.par_chunks_exact_mut(of_layer).enumerate().for_each(|(layer, values)| {
-                let tiles = layer * each..(layer + 1) * each;
-                self.forward(grid, input, rectify, tiles, before, values);
+            let shared = Shared::new(values);
+            let share = tiles.div_ceil(4 * rayon::current_num_threads());
+            (0..tiles.div_ceil(share)).into_par_iter().for_each(|nth| {
+                let tiles = nth * share..((nth + 1) * share).min(tiles);
+                self.forward(grid, input, rectify, tiles, 0, before, shared);
             });
             products.par_chunks_exact_mut(after.frequency).enumerate().for_each(|(f, products)| {
-                for layer in 0..layers {
-                    let values = &values[layer * of_layer + f * before.frequency..];
-                    let rows = Rows { values, stride: before.tile, count: each };
-                    let values = &mut products[layer * each * after.tile..];
-                    let target = Target { values, stride: after.tile, add: false, bias: &[] };
-                    multiply_panels(rows, self.filter(f), target);
-                }
+                let rows =
+                    Rows { values: &values[f * before.frequency..], stride: before.tile, count: tiles };
+                let target = Target { values: products, stride: after.tile, add: false, bias: &[] };
+                multiply_panels(rows, self.filter(f), target);
             });
             let in_layer = self.tile[0] * grid.size[1] * grid.size[2] * self.outputs;
             out.par_chunks_mut(in_layer).enumerate().for_each(|(layer, out)| {
@@ -165,17 +180,19 @@ impl Winograd {
         PanelsRef { depth: self.inputs, columns, instructions: self.instructions, values }
     }
 
+    #[allow(clippy::too_many_arguments)]
     fn forward(
         &self,
         grid: Grid,
         input: &[f32],
         rectify: bool,
         tiles: Range<usize>,
+        first: usize,
         spread: Spread,
-        out: &mut [f32],
+        out: Shared,
     ) {
-        let channels = self.inputs;
-        for_tiles!(self, Forward { grid, input, channels, rectify, tiles, spread, out });
+        let (channels, zeros) = (self.inputs, &self.zeros[..]);
+        for_tiles!(self, Forward { grid, input, channels, rectify, tiles, spread, zeros, first, out });
     }
 
     #[allow(clippy::too_many_arguments)]
@@ -191,33 +208,64 @@ impl Winograd {
         out: &mut [f32],
     ) {
         let (channels, bias) = (self.outputs, &self.bias[..]);
-        for_tiles!(self, Backward { grid, products, first, spread, tiles, channels, bias, add, layer, out });
+        with_scratch(channels, |waste| {
+            for_tiles!(
+                self,
+                Backward { grid, products, first, spread, tiles, channels, bias, add, layer, out, waste }
+            );
+        });
     }
 }
 
-/// Filters of three taps an axis as frequencies: frequency x filter. Of an axis of tiles of one cell, they have one tap.
-fn transform_filters(weight: &[f32], tile: [usize; 3]) -> Vec<f32> {
-    let [a, b, c] = tile.map(filter_rows);
-    let taps = [a, b, c].map(|rows| rows[0].len());
-    let filters = weight.len() / taps.iter().product::<usize>();
-    let mut out = vec![0.0; a.len() * b.len() * c.len() * filters];
-    for (f, filter) in weight.chunks_exact(taps.iter().product()).enumerate() {
-        let mut values: Vec<f64> = filter.iter().map(|&w| f64::from(w)).collect();
-        // The first axis is transformed and made the last, three times.
-        for rows in [a, b, c] {
-            let rest = values.len() / rows[0].len();
-            let mut next = vec![0.0; rest * rows.len()];
-            for (i, row) in rows.iter().enumerate() {
-                for r in 0..rest {
-                    next[r * rows.len() + i] =
-                        row.iter().enumerate().map(|(tap, factor)| factor * values[tap * rest + r]).sum();
-                }
+/// Most columns of a panel.
+const WIDEST_PANEL: usize = 32;
+
+for_each_instruction_set! {
+/// Makes filters of three taps an axis (along axes with tiles of one cell, of one) into panels, `panel` columns wide at
+/// most, frequency by frequency. Columns beyond `outputs` up to `width` are left as they are.
+fn transform_filters(
+    weight: &[f32],
+    tile: [usize; 3],
+    [inputs, outputs, width]: [usize; 3],
+    panel: usize,
+    out: &mut [f32],
+) {
+    let rows = tile.map(filter_rows);
+    let taps: usize = rows.iter().map(|rows| rows[0].len()).product();
+    // Filters of one input and the outputs of a panel, side by side.
+    let mut values = vec![[0.0; WIDEST_PANEL]; CELLS];
+    let mut next = values.clone();
+    for first in (0..outputs).step_by(panel) {
+        let across = panel.min(width - first);
+        let columns = panel.min(outputs - first);
+        for input in 0..inputs {
+            for column in 0..columns {
+                let filter = &weight[((first + column) * inputs + input) * taps..][..taps];
+                values.iter_mut().zip(filter).for_each(|(values, &w)| values[column] = f64::from(w));
             }
-            values = next;
-        }
-        for (frequency, value) in values.into_iter().enumerate() {
-            out[frequency * filters + f] = value as f32;
+            // The first axis is transformed and made the last, three times.
+            let mut count = taps;
+            for rows in rows {
+                let rest = count / rows[0].len();
+                for (i, row) in rows.iter().enumerate() {
+                    for r in 0..rest {
+                        let mut sums = [0.0; WIDEST_PANEL];
+                        for (tap, factor) in row.iter().enumerate() {
+                            let values = &values[tap * rest + r];
+                            sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
+                        }
+                        next[r * rows.len() + i] = sums;
+                    }
+                }
+                count = rest * rows.len();
+                std::mem::swap(&mut values, &mut next);
+            }
+            for (frequency, values) in values[..count].iter().enumerate() {
+                let start = (frequency * width + first) * inputs + input * across;
+                let to = out[start..][..columns].iter_mut();
+                to.zip(values).for_each(|(to, &value)| *to = value as f32);
+            }
         }
     }
-    out
+}
 }

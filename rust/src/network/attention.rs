@@ -91,12 +91,24 @@ for_each_instruction_set! {
 /// Exponentials of each row, divided by their sum.
 fn share_rows(values: &mut [f32], width: usize) {
     for row in values.chunks_exact_mut(width) {
-        let most = row.iter().fold(f32::NEG_INFINITY, |most, &v| if v > most { v } else { most });
+        let most = largest(row);
         row.iter_mut().for_each(|v| *v = exponential(*v - most));
         let by = 1.0 / sum(row);
         row.iter_mut().for_each(|v| *v *= by);
     }
 }
+}
+
+#[inline(always)]
+fn largest(values: &[f32]) -> f32 {
+    let (lanes, rest) = values.as_chunks::<LANES>();
+    let mut most = [f32::NEG_INFINITY; LANES];
+    for values in lanes {
+        for lane in 0..LANES {
+            most[lane] = if values[lane] > most[lane] { values[lane] } else { most[lane] };
+        }
+    }
+    most.iter().chain(rest).fold(f32::NEG_INFINITY, |most, &v| if v > most { v } else { most })
 }
 
 #[inline(always)]
