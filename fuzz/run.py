@@ -75,10 +75,13 @@ def _watched(name: str, folder: Path, engine: str, seed: int, budget: int) -> tu
     scratch.mkdir(exist_ok=True)
     with (folder / "log").open("wb") as log:
         child = subprocess.Popen(arguments, stdout=log, stderr=log, env=os.environ | one | {"TMPDIR": str(scratch)})
+        current, last, silent = folder / "current", 0, 0.0
         while child.poll() is None:
             time.sleep(0.2)
-            current = folder / "current"
-            if current.exists() and time.time() > current.stat().st_mtime + PATIENCE:
+            now = current.stat().st_mtime_ns if current.exists() else 0
+            # Counted, not read off a clock: that goes on while a machine is suspended.
+            last, silent = now, silent + 0.2 if now == last else 0.0
+            if now and silent > PATIENCE:
                 child.kill()
                 child.wait()
                 return child.returncode, f"no sign of life for {PATIENCE:g} seconds"
