@@ -8,8 +8,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-import torch
-
 import sketchcore as sk
 from sketchcore.nets.compactmodel import CompactModel
 from sketchcore.nets.sketches import Sketches
@@ -19,25 +17,17 @@ RUNS = 15
 
 
 def main() -> None:
-    model = sk.load_model(device="cpu")
+    model = sk.load_model()
     assert isinstance(model, CompactModel)
+    passes = model.passes
     batch = sk.generate(0, max(SIZES), views=2)
     objects = [Sketches(*pair) for pair in zip(batch.drawings, batch.packed_cameras, strict=True)]
-    evidence = model.passes.evidence(objects)
-    readings = model.passes.read(objects, evidence)
-    prior = model.passes.decide(readings, None, [2] * len(objects))
-    threads = sorted({1, torch.get_num_threads()})
-    print(
-        "| objects in a pass | " + " | ".join(f"{n} thread{'s' * (n > 1)}: wall, CPU ms each" for n in threads) + " |"
-    )
-    print("|---" * (1 + len(threads)) + "|")
+    readings = passes.read(objects)
+    prior = passes.decide(readings, None, [2] * len(objects))
+    print("| objects in a pass | wall, CPU ms each |\n|---|---|")
     for size in SIZES:
-        cells = []
-        for count in threads:
-            torch.set_num_threads(count)
-            wall, cpu = least(lambda size=size: model.passes.decide(readings[:size], prior[:size], [2] * size))
-            cells.append(f"{1000 * wall / size:.1f}, {1000 * cpu / size:.1f}")
-        print(f"| {size} | " + " | ".join(cells) + " |", flush=True)
+        wall, cpu = least(lambda size=size: passes.decide(readings[:size], prior[:size], [2] * size))
+        print(f"| {size} | {1000 * wall / size:.1f}, {1000 * cpu / size:.1f} |", flush=True)
 
 
 def least(job: Callable[[], object]) -> tuple[float, float]:

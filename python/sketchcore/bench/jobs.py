@@ -15,10 +15,13 @@ import trimesh
 import sketchcore as sk
 from sketchcore.bench.drawings import embree_drawing, opengl_drawing
 from sketchcore.bench.machine import Machine, measure
+from sketchcore.bench.network import torch_passes
 from sketchcore.bench.resampling import numba_resampling, torch_resampling
 from sketchcore.bench.solids import open3d_solid, torus
 from sketchcore.bench.timing import medians
 from sketchcore.bench.voxels import numpy_voxels
+from sketchcore.nets.compactmodel import CompactModel
+from sketchcore.nets.sketches import Sketches
 
 CAMERA = sk.VIEWPOINTS["quarter-037"]
 SHAPES = 4
@@ -152,7 +155,7 @@ def _held(contest: Contest, machine: Machine, repetitions: int) -> Row:
 
 def contests() -> list[Contest]:
     """The jobs, each on fixed inputs."""
-    return [_voxels(), _drawing(), *_resampling(), _solid(), *_samples(), _style()]
+    return [_voxels(), _drawing(), *_resampling(), _solid(), *_network(), *_samples(), _style()]
 
 
 def _voxels() -> Contest:
@@ -256,6 +259,37 @@ def _solid() -> Contest:
         # A face's bounds, its edges and its plane.
         sums=len(faces) * 40,
     )
+
+
+def _network() -> list[Contest]:
+    batch = sk.generate(0, 1)
+    samples = [Sketches(batch.drawings[0], batch.packed_cameras[0])]
+    ready = samples[0].fields, samples[0].evidence
+    model = sk.load_model(device="cpu")
+    assert isinstance(model, CompactModel)
+    passes = model.passes
+    readings = passes.read(samples)
+    prior = passes.decide(readings, None, [1])
+    jobs = [
+        ("the network reads a drawing", lambda: passes.read(samples), sum(array.nbytes for array in ready), 0.9e9),
+        (
+            "a round of the network",
+            lambda: passes.decide(readings, prior, [1]),
+            prior.nbytes + readings[0].nbytes,
+            2.0e9,
+        ),
+    ]
+    return [
+        Contest(
+            job,
+            ours,
+            [("torch, in its fastest precision", 1.5, lambda which=which: torch_passes(samples, prior)[which])],  # type: ignore[misc]
+            moved=moved,
+            # Those of Winograd's algorithm, about: by their formula, convolutions take 2.8 and 10.4 GFLOP.
+            sums=sums,
+        )
+        for which, (job, ours, moved, sums) in enumerate(jobs)
+    ]
 
 
 def _samples() -> list[Contest]:
