@@ -451,6 +451,21 @@ def test_an_index_that_is_none_is_refused(index: str, tmp_path: Path) -> None:
         Prepared(tmp_path)
 
 
+def test_an_index_whose_hashes_are_none_is_refused(tmp_path: Path) -> None:
+    entries = [{"file": "a.safetensors", "split": "train", "sha256": hash} for hash in (1, "..")]
+    (tmp_path / "dataset.json").write_text(json.dumps({"format": VERSION, "objects": entries}))
+    with pytest.raises(ValueError, match="is no data set of sketchcore prepare"):
+        Prepared(tmp_path)
+
+
+def test_a_long_header_of_a_volume_is_told_in_short(tmp_path: Path) -> None:
+    path = tmp_path / "volume.binvox"
+    path.write_bytes(b"#binvox 1\ndim 64" + b" \x00x" * 5000 + b"\ndata\n")
+    with pytest.raises(ValueError, match="a cube up to 1024") as caught:
+        sk.load(path)
+    assert len(str(caught.value)) < 500
+
+
 _OBJECT = {
     "vertices": np.zeros((3, 3), np.float32),
     "faces": np.zeros((1, 3), np.int32),

@@ -147,7 +147,7 @@ def load_binvox(path: str | os.PathLike[str]) -> NDArray[np.float32]:
         raise ValueError(f"{path} must start with '#binvox 1' or '#binvox 2', and have a line 'data' after the header")
     dims = next((line.split()[1:] for line in lines if line.startswith("dim ")), [])
     if len(dims) != 3 or len(set(dims)) != 1 or not dims[0].isdecimal() or not 0 < int(dims[0]) <= 1024:
-        raise ValueError(f"{path} must have a line such as 'dim 64 64 64', a cube up to 1024; got {dims}")
+        raise ValueError(f"{path} must have a line such as 'dim 64 64 64', a cube up to 1024; got {str(dims)[:80]}")
     n = int(dims[0])
     if len(body) % 2:
         raise ValueError(f"{path} is truncated: its runs must be pairs of bytes, got {len(body)} bytes")

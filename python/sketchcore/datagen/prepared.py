@@ -144,10 +144,10 @@ class Prepared:
                 raise ValueError(f"its format is {data['format']}, this version reads {VERSION}")
             objects = {split: [item for item in data["objects"] if item["split"] == split] for split in SPLITS}
             self._files = {split: [_name(item["file"]) for item in items] for split, items in objects.items()}
-            named = [(item["file"], item["split"], item["sha256"]) for item in data["objects"]]
+            named = sorted((item["file"], item["split"], item["sha256"]) for item in data["objects"])
         except (KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{index} is no data set of sketchcore prepare: {reason(error)}") from error
-        self.fingerprint = hashlib.sha256(json.dumps(sorted(named)).encode()).hexdigest()[:16]
+        self.fingerprint = hashlib.sha256(json.dumps(named).encode()).hexdigest()[:16]
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{len(self._files[split])} {split}" for split in SPLITS)
