@@ -1,6 +1,7 @@
 """The Rust kernels. Arrays are C-contiguous; cameras and shapes are packed (`Camera.packed`, `Shape.packed`)."""
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,6 +140,7 @@ def bilateral(
     sigma_normal: float,
 ) -> NDArray[np.float64]: ...
 
+@final
 class CompactNetwork:
     """The compact network on the CPU, float32, weights laid out once: `CompactNet` for whoever only asks.
 

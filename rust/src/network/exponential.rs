@@ -7,8 +7,7 @@ const ROUND: f32 = 12_582_912.0;
 /// ln 2, in a part of few digits and a rest.
 const LN_2: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
 /// Of the polynomial for `exp(r) - 1 - r` over `r` squared, the highest power first (Cephes).
-const POWERS: [f32; 6] =
-    [1.987_569_1e-4, 1.398_199_9e-3, 8.333_452e-3, 4.166_579_6e-2, 1.666_666_5e-1, 5.000_000_1e-1];
+const POWERS: [f32; 6] = [1.987_569_1e-4, 1.398_199_9e-3, 8.333_452e-3, 4.166_579_6e-2, 1.666_666_5e-1, 0.5];
 
 /// e to the `x`, to 2^-22 of itself; what is beyond the range of `f32` is as its ends, and NaN stays NaN.
 #[inline(always)]

@@ -82,7 +82,7 @@ fn sum_channels(values: &[f32], out: &mut [[f64; 2]]) {
         let first = &values[block * LANES..][..out.len()];
         for cell in values.chunks_exact(width) {
             let cell = &cell[block * LANES..][..first.len()];
-            if let (Some(cell), Some(first)) = (cell.as_array::<LANES>(), first.as_array::<LANES>()) {
+            if let (Some(cell), Some(first)) = (cell.first_chunk::<LANES>(), first.first_chunk::<LANES>()) {
                 for lane in 0..LANES {
                     let off = cell[lane] - first[lane];
                     sums[lane] += off;

@@ -62,7 +62,7 @@ impl CompactNetwork {
         same_count("drawings", drawings.len() / (IMAGE * IMAGE), cameras.len())?;
         same_count("fields", fields.len() / (2 * IMAGE * IMAGE), cameras.len())?;
         same_count("evidence", evidence.len() / network::EVIDENCE_BYTES, counts.len())?;
-        let out = among_threads(py, || self.0.read(drawings, fields, cameras, &counts, evidence))?;
+        let out = py.detach(|| self.0.read(drawings, fields, cameras, &counts, evidence))?;
         PyArray1::from_vec(py, out).reshape(vec![counts.len(), HALF, self.0.outputs()])
     }
 
@@ -83,14 +83,9 @@ impl CompactNetwork {
         if let Some(prior) = prior {
             same_count("prior", prior.len() / (HALF * VOXELS), counts.len())?;
         }
-        let out = among_threads(py, || self.0.decide(readings, prior, &counts))?;
+        let out = py.detach(|| self.0.decide(readings, prior, &counts))?;
         PyArray1::from_vec(py, out).reshape([&[counts.len()][..], &grid].concat())
     }
-}
-
-/// Computes on a thread of the pool: any other would go to sleep, and be woken, for each loop of each layer.
-fn among_threads<R: Send>(py: Python<'_>, compute: impl FnOnce() -> R + Send) -> R {
-    py.detach(|| rayon::scope(|_| compute()))
 }
 
 /// The numbers of a weight, if they are `float32`.
