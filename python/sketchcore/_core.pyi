@@ -139,6 +139,54 @@ def bilateral(
     sigma_spatial: float,
     sigma_normal: float,
 ) -> NDArray[np.float64]: ...
+def convolve(
+    input: NDArray[np.float32],
+    weight: NDArray[np.float32],
+    bias: NDArray[np.float32] | None = None,
+    *,
+    rectify: bool = False,
+) -> NDArray[np.float32]:
+    """A convolution of 3 cells a side, stride 1, one cell of zeros around; float32 [n, cells..., outputs].
+
+    Args:
+        input: [n, rows, cols, inputs] or [n, x, y, z, inputs].
+        weight: [outputs, inputs, 3, 3] or [outputs, inputs, 3, 3, 3].
+        bias: [outputs].
+        rectify: take negative inputs for 0.
+
+    Raises:
+        ValueError: for arrays that do not fit each other, or are not C-contiguous.
+    """
+
+def convolve_transposed(
+    gradient: NDArray[np.float32], weight: NDArray[np.float32], *, rectified: NDArray[np.float32] | None = None
+) -> NDArray[np.float32]:
+    """The gradient by the input of `convolve`, [n, cells..., inputs], from that by its output.
+
+    Args:
+        gradient: [n, cells..., outputs].
+        weight: as for `convolve`.
+        rectified: the input, if it was rectified.
+
+    Raises:
+        ValueError: as `convolve`.
+    """
+
+def filter_gradient(
+    input: NDArray[np.float32], gradient: NDArray[np.float32], *, rectify: bool = False
+) -> NDArray[np.float32]:
+    """The gradient by the weight of `convolve`, [outputs, inputs, 3, 3] or [outputs, inputs, 3, 3, 3].
+
+    The same to the bit on any number of threads.
+
+    Args:
+        input: as for `convolve`.
+        gradient: by its output, [n, cells..., outputs].
+        rectify: as for `convolve`.
+
+    Raises:
+        ValueError: as `convolve`.
+    """
 
 @final
 class CompactNetwork:

@@ -7,12 +7,15 @@
 //! A result does not depend on the number of threads. It differs in the last digits between instruction sets.
 
 mod gathered;
+mod gradient;
 mod memory;
 mod product;
 mod tiles;
 mod transform;
 mod vector;
 mod winograd;
+
+pub use gradient::{filter_gradient, input_gradient};
 
 use gathered::Gathered;
 use memory::with_scratch;
@@ -78,14 +81,31 @@ impl Convolution {
     /// of rayon's current pool. If `rectify`, negative inputs are taken for 0; if `add`, the result is added to what
     /// `out` holds.
     pub fn apply(&self, input: &[f32], size: [usize; 3], rectify: bool, add: bool, out: &mut [f32]) {
-        assert_eq!(input.len(), size.iter().product::<usize>() * self.inputs);
-        assert_eq!(out.len(), self.output_size(size).iter().product::<usize>() * self.outputs);
+        self.apply_to_all(1, input, size, rectify, add, out);
+    }
+
+    /// Does so for `samples` grids, one after the other in memory.
+    pub fn apply_to_all(
+        &self,
+        samples: usize,
+        input: &[f32],
+        size: [usize; 3],
+        rectify: bool,
+        add: bool,
+        out: &mut [f32],
+    ) {
+        let read = size.iter().product::<usize>() * self.inputs;
+        let written = self.output_size(size).iter().product::<usize>() * self.outputs;
+        assert_eq!((input.len(), out.len()), (samples * read, samples * written));
         if out.is_empty() {
             return;
         }
         match &self.way {
-            Way::Winograd(way) => way.apply(input, size, rectify, add, out),
-            Way::Gathered(way) => way.apply(input, size, rectify, add, out),
+            Way::Winograd(way) => way.apply(samples, input, size, rectify, add, out),
+            Way::Gathered(way) => {
+                let samples = input.chunks(read).zip(out.chunks_mut(written));
+                samples.for_each(|(input, out)| way.apply(input, size, rectify, add, out));
+            }
         }
     }
 

@@ -68,13 +68,24 @@ fn read_planes(camera: &Camera, features: &[f32], width: usize, planes: Range<us
 pub fn read_transposed(camera: &Camera, gradient: &[f32], width: usize, out: &mut [f32]) {
     assert_eq!(out.len(), ENTRIES * width);
     assert_eq!(gradient.len(), 2 * HALF * width);
+    add_readings(camera, gradient, width, out);
+}
+
+for_each_instruction_set! {
+fn add_readings(camera: &Camera, gradient: &[f32], width: usize, out: &mut [f32]) {
     for_each_reading(camera, 0..COARSE, |reading, taps| {
-        let gradient = &gradient[reading * width..][..width];
+        let (lanes, rest) = gradient[reading * width..][..width].as_chunks::<LANES>();
         for (row, weight) in taps {
-            let out = &mut out[row * width..][..width];
-            out.iter_mut().zip(gradient).for_each(|(o, g)| *o += weight * g);
+            let (out, out_rest) = out[row * width..][..width].as_chunks_mut::<LANES>();
+            for (out, gradient) in out.iter_mut().zip(lanes) {
+                for lane in 0..LANES {
+                    out[lane] += weight * gradient[lane];
+                }
+            }
+            out_rest.iter_mut().zip(rest).for_each(|(o, g)| *o += weight * g);
         }
     });
+}
 }
 
 /// Rows and weights of all readings, for devices that gather by themselves.

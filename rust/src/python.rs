@@ -2,6 +2,7 @@
 //! let go of the interpreter, and call a kernel.
 
 mod arrays;
+mod convolution;
 mod drawings;
 mod lift;
 mod meshes;
@@ -43,6 +44,8 @@ impl From<SolidError> for PyErr {
 
 #[pymodule]
 mod _core {
+    #[pymodule_export]
+    use super::convolution::{convolve, convolve_transposed, filter_gradient_of};
     #[pymodule_export]
     use super::drawings::{carve, evidence, evidence_fields, silhouettes};
     #[pymodule_export]

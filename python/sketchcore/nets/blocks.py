@@ -7,19 +7,20 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from sketchcore.nets.config import HEADS
+from sketchcore.nets.convolution import Conv2d, Conv3d
 
 
 class Block(nn.Module):
     """Two convolutions of 3 cells a side around a normalisation per sample that a code scales and shifts.
 
     Args:
-        convolution: `nn.Conv2d` or `nn.Conv3d`.
+        convolution: `Conv2d` or `Conv3d`.
         width: channels.
         groups: groups of the normalisation.
         code: numbers of the code.
     """
 
-    def __init__(self, convolution: type[nn.Conv2d] | type[nn.Conv3d], width: int, groups: int, code: int) -> None:
+    def __init__(self, convolution: type[Conv2d] | type[Conv3d], width: int, groups: int, code: int) -> None:
         super().__init__()
         self.conv1 = convolution(width, width, 3, padding=1, bias=False)
         self.norm = nn.GroupNorm(groups, width)
@@ -31,8 +32,8 @@ class Block(nn.Module):
     def forward(self, x: Tensor, code: Tensor) -> Tensor:
         film = self.film(code)
         scale, shift = film.view(*film.shape, *[1] * (x.dim() - 2)).chunk(2, dim=1)
-        h = self.norm(self.conv1(F.relu(x)))
-        out: Tensor = x + self.conv2(F.relu(h * (1 + scale) + shift))
+        h = self.norm(self.conv1.rectified(x))
+        out: Tensor = x + self.conv2.rectified(h * (1 + scale) + shift)
         return out
 
 

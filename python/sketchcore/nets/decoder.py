@@ -9,6 +9,7 @@ from torch.nn import functional as F
 
 from sketchcore.nets.blocks import Attention, Block, twice
 from sketchcore.nets.config import CompactConfig
+from sketchcore.nets.convolution import Conv3d
 from sketchcore.nets.lift import COARSE
 
 EVIDENCE = 3
@@ -26,18 +27,18 @@ class WorldDecoder(nn.Module):
         inputs = 2 * config.fused + 8 * (EVIDENCE + 1) + 3
         self.condition = nn.Sequential(nn.Linear(2, code), nn.ReLU())
         self.into = nn.Conv3d(inputs, w32, 1)
-        self.encode32 = Block(nn.Conv3d, w32, groups, code)
+        self.encode32 = Block(Conv3d, w32, groups, code)
         self.down16 = nn.Conv3d(w32, w16, 2, stride=2)
-        self.encode16 = Block(nn.Conv3d, w16, groups, code)
+        self.encode16 = Block(Conv3d, w16, groups, code)
         self.down8 = nn.Conv3d(w16, w8, 2, stride=2)
-        self.encode8 = Block(nn.Conv3d, w8, groups, code)
+        self.encode8 = Block(Conv3d, w8, groups, code)
         self.attention = Attention(w8, 8 * 8 * 4)
-        self.decode8 = Block(nn.Conv3d, w8, groups, code)
+        self.decode8 = Block(Conv3d, w8, groups, code)
         self.up16 = nn.Conv3d(w8, w16, 1)
-        self.decode16 = Block(nn.Conv3d, w16, groups, code)
+        self.decode16 = Block(Conv3d, w16, groups, code)
         self.up32 = nn.Conv3d(w16, w32, 1)
-        self.decode32 = Block(nn.Conv3d, w32, groups, code)
-        self.out = nn.Conv3d(w32, 8, 3, padding=1)
+        self.decode32 = Block(Conv3d, w32, groups, code)
+        self.out = Conv3d(w32, 8, 3, padding=1)
         self.shortcut = nn.Conv3d(inputs, 8, 1)
         nn.init.zeros_(self.shortcut.weight)
         nn.init.constant_(self.out.bias, -2.0)  # type: ignore[arg-type]
@@ -80,7 +81,7 @@ class WorldDecoder(nn.Module):
         x8 = self.decode8(self.attention(x8), code)
         y16 = self.decode16(x16 + twice(self.up16(F.relu(x8))), code)
         y32 = self.decode32(x32 + twice(self.up32(F.relu(y16))), code)
-        out: Tensor = self.out(F.relu(y32)) + shortcut
+        out: Tensor = self.out.rectified(y32) + shortcut
         return out
 
 

@@ -8,6 +8,7 @@ from torch.nn import functional as F
 
 from sketchcore.nets.blocks import Attention, Block, twice
 from sketchcore.nets.config import CompactConfig
+from sketchcore.nets.convolution import Conv2d
 from sketchcore.nets.lift import BINS, PLANE
 
 
@@ -18,20 +19,20 @@ class DrawingEncoder(nn.Module):
         super().__init__()
         stem, (w32, w16, w8), code, groups = config.stem, config.image, 64, config.groups
         self.condition = nn.Sequential(nn.Linear(9, code), nn.ReLU(), nn.Linear(code, code), nn.ReLU())
-        self.into = nn.Conv2d(3 * 16, stem, 3, padding=1)
+        self.into = Conv2d(3 * 16, stem, 3, padding=1)
         self.down32 = nn.Conv2d(stem, w32, 3, stride=2, padding=1)
-        self.encode32 = Block(nn.Conv2d, w32, groups, code)
+        self.encode32 = Block(Conv2d, w32, groups, code)
         self.down16 = nn.Conv2d(w32, w16, 3, stride=2, padding=1)
-        self.encode16 = Block(nn.Conv2d, w16, groups, code)
+        self.encode16 = Block(Conv2d, w16, groups, code)
         self.down8 = nn.Conv2d(w16, w8, 3, stride=2, padding=1)
-        self.encode8 = Block(nn.Conv2d, w8, groups, code)
+        self.encode8 = Block(Conv2d, w8, groups, code)
         self.attention = Attention(w8, 8 * 8)
         self.up16 = nn.Conv2d(w8, w16, 1)
-        self.decode16 = Block(nn.Conv2d, w16, groups, code)
+        self.decode16 = Block(Conv2d, w16, groups, code)
         self.up32 = nn.Conv2d(w16, w32, 1)
-        self.decode32 = Block(nn.Conv2d, w32, groups, code)
+        self.decode32 = Block(Conv2d, w32, groups, code)
         self.up64 = nn.Conv2d(w32, stem, 1)
-        self.fine = nn.Conv2d(2 * stem, stem, 3, padding=1)
+        self.fine = Conv2d(2 * stem, stem, 3, padding=1)
         self.out = nn.Conv2d(stem, BINS * config.features, 1)
 
     def forward(self, drawing: Tensor, fields: Tensor, rotation: Tensor) -> Tensor:

@@ -37,6 +37,11 @@ def has_fast_bfloat16(device: torch.device) -> bool:
     return device.type == "cpu" and any(bool(getattr(torch.cpu, c, bool)()) for c in checks)
 
 
+def has_own_convolutions(device: torch.device) -> bool:
+    """Whether the kernels' convolutions, in float32, are faster than torch's: on CPUs without AMX."""
+    return device.type == "cpu" and not bool(getattr(torch.cpu, "_is_amx_tile_supported", bool)())
+
+
 def fast_dtype(device: torch.device) -> torch.dtype:
     """The type in which convolutions are fastest: bfloat16 or float32."""
     return torch.bfloat16 if has_fast_bfloat16(device) else torch.float32

@@ -23,7 +23,7 @@ from sketchcore.nets.compact import CompactNet, read_inputs
 from sketchcore.nets.compactmodel import CompactModel
 from sketchcore.nets.config import CompactConfig
 from sketchcore.nets.loading import passes_of
-from sketchcore.nets.precision import autocast, place, unit
+from sketchcore.nets.precision import autocast, has_own_convolutions, place, unit
 from sketchcore.nets.sketches import Sketches
 from sketchcore.train.ahead import Ahead
 from sketchcore.train.distributed import ALONE, Ranks
@@ -168,7 +168,7 @@ class ChainStage:
                 self._batch[slot] = next(self._chains)
         chains = list(self._batch.values())
         truth = torch.from_numpy(np.stack([c.truth for c in chains])).to(self._device)
-        with autocast(self._device):
+        with autocast(self._device, enabled=not has_own_convolutions(self._device)):
             logits = self.forward(**compact_inputs(chains, self._device))
         loss = self._loss(logits, truth)
         predictions = logits.detach().float().sigmoid().cpu().numpy()

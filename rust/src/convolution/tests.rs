@@ -16,7 +16,7 @@ enum Kind {
 }
 
 /// Numbers between -1 and 1, without any pattern.
-fn noise(count: usize, seed: usize) -> Vec<f32> {
+pub(super) fn noise(count: usize, seed: usize) -> Vec<f32> {
     let mix = |x: u32, shift: u32, by: u32| (x ^ (x >> shift)).wrapping_mul(by);
     let at = |i: usize| mix(mix((i + (seed << 24)) as u32, 16, 0x7feb_352d), 15, 0x846c_a68b) ^ 0x5a5a_5a5a;
     (0..count).map(|i| (mix(at(i), 16, 1) >> 8) as f32 / (1 << 23) as f32 - 1.0).collect()
@@ -140,7 +140,7 @@ impl std::fmt::Debug for Case {
     }
 }
 
-fn in_pool<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
+pub(super) fn in_pool<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
 }
 

@@ -112,6 +112,12 @@ impl<'a> Shared<'a> {
     pub fn new(floats: &'a mut [f32]) -> Self {
         Self { start: floats.as_mut_ptr(), length: floats.len(), life: PhantomData }
     }
+
+    /// All but the first floats.
+    pub fn skip(self, floats: usize) -> Self {
+        assert!(floats <= self.length);
+        Self { start: self.start.wrapping_add(floats), length: self.length - floats, ..self }
+    }
 }
 
 /// Transforms tiles of the input. No other thread may have any of these tiles.

@@ -5,6 +5,7 @@
 //! at a few points and at infinity. In several axes, transforms are made in one after the other.
 
 use super::vector::Vector;
+use std::marker::PhantomData;
 
 /// The most inputs that a tile has along an axis.
 pub(super) const WIDEST: usize = 6;
@@ -29,6 +30,34 @@ pub(super) trait Axis {
     ///
     /// That of `Vector`.
     unsafe fn backward<V: Vector>(line: &mut [V; WIDEST]);
+
+    /// The transpose of `backward`: `TILE` outputs, which follow a cell of the margin, are made into `WIDE` products.
+    ///
+    /// # Safety
+    ///
+    /// That of `Vector`.
+    unsafe fn backward_transposed<V: Vector>(line: &mut [V; WIDEST]);
+}
+
+/// An axis whose way forward is the transpose of the way back of another.
+pub(super) struct Turned<A>(PhantomData<A>);
+
+impl<A: Axis> Axis for Turned<A> {
+    const TILE: usize = A::TILE;
+    const WIDE: usize = A::WIDE;
+    #[inline(always)]
+    unsafe fn forward<V: Vector>(line: &mut [V; WIDEST]) {
+        // SAFETY: the caller's.
+        unsafe { A::backward_transposed(line) }
+    }
+    #[inline(always)]
+    unsafe fn backward<V: Vector>(_: &mut [V; WIDEST]) {
+        unreachable!("gradients of outputs have no way back");
+    }
+    #[inline(always)]
+    unsafe fn backward_transposed<V: Vector>(_: &mut [V; WIDEST]) {
+        unreachable!("gradients of outputs have no way back");
+    }
 }
 
 /// An axis along which nothing is convolved.
@@ -45,6 +74,8 @@ impl Axis for One {
     unsafe fn forward<V: Vector>(_: &mut [V; WIDEST]) {}
     #[inline(always)]
     unsafe fn backward<V: Vector>(_: &mut [V; WIDEST]) {}
+    #[inline(always)]
+    unsafe fn backward_transposed<V: Vector>(_: &mut [V; WIDEST]) {}
 }
 
 impl Axis for Two {
@@ -70,6 +101,18 @@ impl Axis for Two {
         unsafe {
             line[0] = a.plus(b.plus(c));
             line[1] = b.minus(c).plus(d);
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn backward_transposed<V: Vector>(line: &mut [V; WIDEST]) {
+        let [_, a, b, ..] = *line;
+        // SAFETY: the caller's.
+        unsafe {
+            line[0] = a;
+            line[1] = a.plus(b);
+            line[2] = a.minus(b);
+            line[3] = b;
         }
     }
 }
@@ -118,6 +161,24 @@ impl Axis for Four {
             line[1] = of(near_odd, NEAR, far_odd, FAR, V::splat(0.0));
             line[2] = of(near, NEAR * NEAR, far, FAR * FAR, V::splat(0.0));
             line[3] = of(near_odd, NEAR * NEAR * NEAR, far_odd, FAR * FAR * FAR, f);
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn backward_transposed<V: Vector>(line: &mut [V; WIDEST]) {
+        let [_, a, b, c, d, _] = *line;
+        // SAFETY: the caller's.
+        unsafe {
+            let at = |point: f32| {
+                let square = V::splat(point * point);
+                let (even, odd) = (c.times_plus(square, a), d.times_plus(square, b));
+                let up = odd.times_plus(V::splat(point), even);
+                (up, odd.times_plus(V::splat(-point), even))
+            };
+            line[0] = a;
+            (line[1], line[2]) = at(NEAR);
+            (line[3], line[4]) = at(FAR);
+            line[5] = d;
         }
     }
 }

@@ -45,6 +45,20 @@ macro_rules! for_tiles {
     };
 }
 
+pub(super) use for_tiles;
+
+/// Floats of a few grids whose tiles are transformed together: a part of the cache that cores share.
+pub(super) const TOGETHER: usize = 1 << 22;
+
+/// Calls `transform` with each of `samples` grids and shares of its tiles, on several threads.
+pub(super) fn share_out(samples: usize, tiles: usize, transform: impl Fn(usize, Range<usize>) + Sync) {
+    let shares = (4 * rayon::current_num_threads()).div_ceil(samples).min(tiles);
+    (0..samples * shares).into_par_iter().for_each(|nth| {
+        let (sample, share) = (nth / shares, nth % shares);
+        transform(sample, tiles * share / shares..tiles * (share + 1) / shares);
+    });
+}
+
 impl Winograd {
     /// Large tiles spare products and need large filters: those of 192 x 192 channels take 9 MB in tiles of two, and 32
     /// in tiles of four. Where there are so many channels grids have few cells, and it takes longer to read them.
@@ -90,15 +104,36 @@ impl Winograd {
         }
     }
 
-    pub fn apply(&self, input: &[f32], size: [usize; 3], rectify: bool, add: bool, out: &mut [f32]) {
+    /// Convolves `samples` grids of the same size, one after the other in memory.
+    pub fn apply(
+        &self,
+        samples: usize,
+        input: &[f32],
+        size: [usize; 3],
+        rectify: bool,
+        add: bool,
+        out: &mut [f32],
+    ) {
         let grid = Grid::new(size, self.tile);
+        let [read, written] = [input.len() / samples, out.len() / samples];
+        let (wide_in, wide_out) = self.widths();
+        if self.filters.len() > (1 << 19) || samples * grid.tiles[0] < rayon::current_num_threads() {
+            let each = self.frequencies * (wide_in + wide_out) * grid.tiles.iter().product::<usize>();
+            let at_once = (TOGETHER / each).clamp(1, samples);
+            for (input, out) in input.chunks(at_once * read).zip(out.chunks_mut(at_once * written)) {
+                self.by_frequency(grid, out.len() / written, input, rectify, add, out);
+            }
+        } else {
+            let samples = out.par_chunks_mut(written).zip(input.par_chunks(read));
+            samples.for_each(|(out, input)| self.by_layers(grid, input, rectify, add, out));
+        }
+    }
+
+    fn by_layers(&self, grid: Grid, input: &[f32], rectify: bool, add: bool, out: &mut [f32]) {
         let (wide_in, wide_out) = self.widths();
         let at_once = (AT_ONCE / (self.frequencies * (wide_in + wide_out))).max(1);
-        let in_layer = self.tile[0] * size[1] * size[2] * self.outputs;
+        let in_layer = self.tile[0] * grid.size[1] * grid.size[2] * self.outputs;
         let threads = rayon::current_num_threads();
-        if self.filters.len() > (1 << 19) || grid.tiles[0] < threads {
-            return self.by_frequency(grid, input, rectify, add, out);
-        }
         // A few layers of tiles for each task, about as many tiles as are worked on at a time.
         let layers = at_once.div_ceil(grid.in_layer()).min(grid.tiles[0].div_ceil(threads)).max(1);
         out.par_chunks_mut(layers * in_layer).enumerate().for_each(|(nth, out)| {
@@ -140,18 +175,27 @@ impl Winograd {
         });
     }
 
-    fn by_frequency(&self, grid: Grid, input: &[f32], rectify: bool, add: bool, out: &mut [f32]) {
+    fn by_frequency(
+        &self,
+        grid: Grid,
+        samples: usize,
+        input: &[f32],
+        rectify: bool,
+        add: bool,
+        out: &mut [f32],
+    ) {
         let (wide_in, wide_out) = self.widths();
-        let (each, tiles) = (grid.in_layer(), grid.in_layer() * grid.tiles[0]);
+        let each = grid.in_layer() * grid.tiles[0];
+        let tiles = samples * each;
+        let [read, written] = [input.len() / samples, out.len() / samples];
         let (before, after) = (Spread::new(tiles, wide_in), Spread::new(tiles, wide_out));
         let split = self.frequencies * before.frequency;
         with_scratch(split + self.frequencies * after.frequency, |scratch| {
             let (values, products) = scratch.split_at_mut(split);
             let shared = Shared::new(values);
-            let share = tiles.div_ceil(4 * rayon::current_num_threads());
-            (0..tiles.div_ceil(share)).into_par_iter().for_each(|nth| {
-                let tiles = nth * share..((nth + 1) * share).min(tiles);
-                self.forward(grid, input, rectify, tiles, 0, before, shared);
+            share_out(samples, each, |sample, tiles| {
+                let input = &input[sample * read..][..read];
+                self.forward(grid, input, rectify, tiles, 0, before, shared.skip(sample * each * wide_in));
             });
             products.par_chunks_exact_mut(after.frequency).enumerate().for_each(|(f, products)| {
                 let rows =
@@ -160,9 +204,12 @@ impl Winograd {
                 multiply_panels(rows, self.filter(f), target);
             });
             let in_layer = self.tile[0] * grid.size[1] * grid.size[2] * self.outputs;
-            out.par_chunks_mut(in_layer).enumerate().for_each(|(layer, out)| {
-                let tiles = layer * each..(layer + 1) * each;
-                self.backward(grid, products, 0, after, tiles, add, layer * self.tile[0], out);
+            out.par_chunks_mut(written).enumerate().for_each(|(sample, out)| {
+                let products = &products[sample * each * wide_out..];
+                out.par_chunks_mut(in_layer).enumerate().for_each(|(layer, out)| {
+                    let tiles = layer * grid.in_layer()..(layer + 1) * grid.in_layer();
+                    self.backward(grid, products, 0, after, tiles, add, layer * self.tile[0], out);
+                });
             });
         });
     }
