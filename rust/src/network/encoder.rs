@@ -7,6 +7,7 @@ use super::weights::Weights;
 use super::widths::Widths;
 use crate::camera::IMAGE;
 use crate::convolution::Convolution;
+use crate::dispatch::for_each_instruction_set;
 use crate::error::CoreError;
 use crate::evidence::FIELDS;
 use crate::lift::{BINS, ENTRIES, PLANE};
@@ -16,8 +17,8 @@ use rayon::prelude::*;
 const CODE: usize = 64;
 /// Pixels of a drawing along each side of one of its features.
 const FOLD: usize = IMAGE / PLANE;
-/// Images that a drawing and its two fields are.
-const IMAGES: usize = 3;
+/// Channels of a drawing and its two fields.
+const CHANNELS: usize = 3 * FOLD * FOLD;
 /// Sides of the images on the way down.
 const SIZES: [[usize; 3]; 4] = [[64, 64, 1], [32, 32, 1], [16, 16, 1], [8, 8, 1]];
 
@@ -45,7 +46,7 @@ impl Encoder {
             Dense::of(weights, &name("condition.0"), 9, CODE)?,
             Dense::of(weights, &name("condition.2"), CODE, CODE)?,
         ];
-        let into = weights.three(&name("into"), [IMAGES * FOLD * FOLD, stem], 2, true)?;
+        let into = weights.three(&name("into"), [CHANNELS, stem], 2, true)?;
         let down32 = weights.halving(&name("down32"), stem, w32, 2)?;
         let encode32 = Block::of(weights, &name("encode32"), w32, kind)?;
         let down16 = weights.halving(&name("down16"), w32, w16, 2)?;
@@ -83,10 +84,7 @@ impl Encoder {
             levels: [level(0), level(1), level(2), level(3)],
             scratch: vec![
                 0.0;
-                (IMAGES * FOLD * FOLD * pixels)
-                    .max(level(1).len())
-                    .max(level(2).len())
-                    .max(level(3).len())
+                (CHANNELS * pixels).max(level(1).len()).max(level(2).len()).max(level(3).len())
             ],
             joined: vec![0.0; 2 * pixels * self.widths[0]],
             features: vec![0.0; ENTRIES * self.features],
@@ -98,7 +96,7 @@ impl Encoder {
     pub fn apply(&self, drawing: &[u8], fields: &[u8], rotation: &[f32; 9], room: &mut Room) {
         let code = self.condition[1].rectified(&self.condition[0].rectified(rotation));
         let Room { levels: [x64, x32, x16, x8], scratch, joined, features } = room;
-        let image = &mut scratch[..IMAGES * FOLD * FOLD * PLANE * PLANE];
+        let image = &mut scratch[..CHANNELS * PLANE * PLANE];
         fold_images(drawing, fields, image);
         self.into.apply(image, SIZES[0], false, false, x64);
         self.down[0].apply(x64, SIZES[0], true, false, x32);
@@ -138,19 +136,27 @@ pub struct Room {
 fn fold_images(drawing: &[u8], fields: &[u8], out: &mut [f32]) {
     assert_eq!(drawing.len(), IMAGE * IMAGE);
     assert_eq!(fields.len(), FIELDS);
-    const CHANNELS: usize = IMAGES * FOLD * FOLD;
     let rows = drawing.par_chunks(FOLD * IMAGE).zip(fields.par_chunks(FOLD * IMAGE * 2));
-    rows.zip(out.par_chunks_mut(PLANE * CHANNELS)).for_each(|((drawing, fields), out)| {
-        for (col, out) in out.as_chunks_mut::<CHANNELS>().0.iter_mut().enumerate() {
-            for pixel in 0..FOLD * FOLD {
-                let place = pixel / FOLD * IMAGE + col * FOLD + pixel % FOLD;
-                let bytes = [drawing[place], fields[2 * place], fields[2 * place + 1]];
-                for (image, byte) in bytes.iter().enumerate() {
-                    out[image * FOLD * FOLD + pixel] = f32::from(*byte) / 255.0;
-                }
+    let rows = rows.zip(out.par_chunks_mut(PLANE * CHANNELS));
+    rows.for_each(|((drawing, fields), out)| fold_row(drawing, fields, out));
+}
+
+for_each_instruction_set! {
+fn fold_row(drawing: &[u8], fields: &[u8], out: &mut [f32]) {
+    let unit = |byte: u8| f32::from(byte) / 255.0;
+    let lines = drawing.chunks_exact(IMAGE).zip(fields.chunks_exact(2 * IMAGE));
+    for (line, (drawing, fields)) in lines.enumerate() {
+        let pixels = drawing.as_chunks::<FOLD>().0.iter().zip(fields.as_chunks::<{ 2 * FOLD }>().0);
+        for ((drawing, fields), out) in pixels.zip(out.as_chunks_mut::<CHANNELS>().0) {
+            for i in 0..FOLD {
+                let channel = line * FOLD + i;
+                out[channel] = unit(drawing[i]);
+                out[FOLD * FOLD + channel] = unit(fields[2 * i]);
+                out[2 * FOLD * FOLD + channel] = unit(fields[2 * i + 1]);
             }
         }
-    });
+    }
+}
 }
 
 /// Channels of an image half as large, whose pixels are doubled, then those of another image.

@@ -14,9 +14,11 @@ pub const VOXELS: usize = 8;
 pub const EVIDENCE: usize = 3;
 /// Bytes of the evidence of one object.
 pub const BYTES: usize = EVIDENCE * VOXELS * HALF;
+/// What is known of a cell besides: evidence and its place.
+const KNOWN: usize = VOXELS * EVIDENCE + 3;
 /// What the first layer takes of a cell: what it has read, evidence, the prior, and its place.
 pub fn inputs(widths: &Widths) -> usize {
-    2 * widths.fused + VOXELS * EVIDENCE + VOXELS + 3
+    2 * widths.fused + KNOWN + VOXELS
 }
 
 /// Voxels along z of the half grid.
@@ -28,7 +30,8 @@ const CELLS: usize = HALF / COARSE;
 /// whoever has one.
 pub struct Reading {
     each: Convolution,
-    first: Convolution,
+    /// The first layer's share of what was read, and that of evidence and place.
+    first: [Convolution; 2],
     features: usize,
     fused: usize,
 }
@@ -36,11 +39,17 @@ pub struct Reading {
 impl Reading {
     /// From the layer that reads, and the weight, outputs x `inputs`, and the bias of the first layer.
     pub fn new(each: Convolution, weight: &[f32], bias: &[f32], widths: &Widths) -> Self {
-        let seen = 2 * widths.fused + VOXELS * EVIDENCE;
-        let rows = weight.chunks_exact(inputs(widths));
-        let known: Vec<f32> = rows.flat_map(|row| [&row[..seen], &row[seen + VOXELS..]].concat()).collect();
-        let first = Convolution::point(&known, bias, seen + 3, bias.len());
-        Self { each, first, features: widths.features, fused: widths.fused }
+        let seen = 2 * widths.fused;
+        let prior = seen + KNOWN - 3;
+        let (mut of_seen, mut of_known) = (Vec::new(), Vec::new());
+        for row in weight.chunks_exact(inputs(widths)) {
+            of_seen.extend(&row[..seen]);
+            of_known.extend(row[seen..prior].iter().map(|w| w / 255.0)); // evidence comes as whole numbers
+            of_known.extend(&row[prior + VOXELS..]);
+        }
+        let of_seen = Convolution::point(&of_seen, bias, seen, bias.len());
+        let of_known = Convolution::point(&of_known, &[], KNOWN, bias.len());
+        Self { each, first: [of_seen, of_known], features: widths.features, fused: widths.fused }
     }
 
     /// Room for what all cells read in all drawings of an object: sums, then the largest.
@@ -65,52 +74,50 @@ impl Reading {
 
     /// What the first layer makes of what was read in so many drawings, of evidence (`BYTES` of it) and of every cell's
     /// place: `HALF` x its outputs.
-    pub fn finish(&self, seen: &[f32], drawings: usize, evidence: &[u8], out: &mut [f32]) {
+    pub fn finish(&self, seen: &mut [f32], drawings: usize, evidence: &[u8], out: &mut [f32]) {
         assert_eq!(evidence.len(), BYTES);
-        let (inputs, share) = (self.first.inputs(), 1.0 / drawings as f32);
-        let planes =
-            seen.par_chunks(CELLS * 2 * self.fused).zip(out.par_chunks_mut(CELLS * self.first.outputs()));
-        planes.enumerate().for_each_init(
-            || vec![0.0; CELLS * inputs],
+        let share = 1.0 / drawings as f32;
+        let planes = seen.par_chunks_mut(CELLS * 2 * self.fused);
+        let planes = planes.zip(out.par_chunks_mut(CELLS * self.first[0].outputs())).enumerate();
+        planes.for_each_init(
+            || vec![[0.0; KNOWN]; CELLS],
             |known, (x, (seen, out))| {
-                let cells = known.chunks_exact_mut(inputs).zip(seen.chunks_exact(2 * self.fused));
-                for (cell, (known, seen)) in cells.enumerate() {
-                    known[..seen.len()].copy_from_slice(seen);
-                    known[..self.fused].iter_mut().for_each(|sum| *sum *= share);
-                    known[inputs - 3..].copy_from_slice(&place([
-                        x,
-                        cell / (COARSE / 2),
-                        cell % (COARSE / 2),
-                    ]));
+                if drawings > 1 {
+                    let cells = seen.chunks_exact_mut(2 * self.fused);
+                    cells.for_each(|cell| cell[..self.fused].iter_mut().for_each(|sum| *sum *= share));
                 }
-                fold_plane(evidence, x, known, inputs, 2 * self.fused);
-                self.first.apply(known, [CELLS, 1, 1], false, false, out);
+                know(evidence, x, known);
+                self.first[0].apply(seen, [CELLS, 1, 1], false, false, out);
+                self.first[1].apply(known.as_flattened(), [CELLS, 1, 1], false, true, out);
             },
         );
     }
 }
 
 /// Where the centre of a cell is.
+#[inline(always)]
 fn place([x, y, z]: [usize; 3]) -> [f32; 3] {
     let at = |i: usize| (i as f64 + 0.5) / COARSE as f64;
     [(at(x) - 0.5) as f32, (at(y) - 0.5) as f32, at(z) as f32]
 }
 
-/// The evidence of a plane of cells in 0..1, from channel `first` on: the eight voxels of each become channels.
-fn fold_plane(evidence: &[u8], x: usize, out: &mut [f32], width: usize, first: usize) {
-    for (volume, evidence) in evidence.chunks_exact(BYTES / EVIDENCE).enumerate() {
-        for (corner, line) in
-            evidence[2 * x * SIDE * DEEP..][..2 * SIDE * DEEP].chunks_exact(DEEP).enumerate()
-        {
-            let (dx, y, dy) = (corner / SIDE, corner % SIDE / 2, corner % 2);
-            let channel = first + volume * VOXELS + dx * 4 + dy * 2;
-            let cells = out[y * (COARSE / 2) * width..][..COARSE / 2 * width].chunks_exact_mut(width);
-            for (cell, pair) in cells.zip(line.as_chunks::<2>().0) {
-                cell[channel] = f32::from(pair[0]) / 255.0;
-                cell[channel + 1] = f32::from(pair[1]) / 255.0;
+for_each_instruction_set! {
+/// What is known of each cell of a plane: the evidence of its eight voxels, volume by volume, and its place.
+fn know(evidence: &[u8], x: usize, out: &mut [[f32; KNOWN]]) {
+    for (y, cells) in out.chunks_exact_mut(COARSE / 2).enumerate() {
+        // Lines of voxels along z, two along x and two along y of each volume.
+        let lines: [&[[u8; 2]]; EVIDENCE * 4] = std::array::from_fn(|i| {
+            let row = i / 4 * SIDE * SIDE + (2 * x + i / 2 % 2) * SIDE + 2 * y + i % 2;
+            evidence[row * DEEP..][..DEEP].as_chunks().0
+        });
+        for (z, cell) in cells.iter_mut().enumerate() {
+            for (line, pair) in lines.iter().zip(cell.as_chunks_mut::<2>().0) {
+                *pair = line[z].map(f32::from);
             }
+            cell[KNOWN - 3..].copy_from_slice(&place([x, y, z]));
         }
     }
+}
 }
 
 for_each_instruction_set! {
@@ -146,18 +153,18 @@ mod tests {
     #[test]
     fn the_eight_voxels_of_a_cell_become_channels() {
         let evidence: Vec<u8> = (0..BYTES).map(|i| (i * 89 % 253) as u8).collect();
-        let (x, width, first) = (11, 30, 4);
-        let mut out = vec![-1.0; CELLS * width];
-        fold_plane(&evidence, x, &mut out, width, first);
-        for (i, got) in out.iter().enumerate() {
-            let (y, z, channel) = (i / width / 16, i / width % 16, i % width);
-            let expected = channel.checked_sub(first).filter(|c| *c < 24).map_or(-1.0, |channel| {
+        let x = 11;
+        let mut out = vec![[-1.0; KNOWN]; CELLS];
+        know(&evidence, x, &mut out);
+        for (cell, known) in out.iter().enumerate() {
+            let (y, z) = (cell / 16, cell % 16);
+            for (channel, got) in known[..24].iter().enumerate() {
                 let (volume, corner) = (channel / 8, channel % 8);
                 let voxel =
                     (2 * x + corner / 4) * 64 * 32 + (2 * y + corner / 2 % 2) * 32 + 2 * z + corner % 2;
-                f32::from(evidence[volume * 64 * 64 * 32 + voxel]) / 255.0
-            });
-            assert_eq!(*got, expected);
+                assert_eq!(*got, f32::from(evidence[volume * 64 * 64 * 32 + voxel]));
+            }
+            assert_eq!(known[24..], place([x, y, z]));
         }
     }
 
