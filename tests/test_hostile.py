@@ -229,6 +229,14 @@ def test_numbers_that_overflow_are_refused_without_warnings() -> None:
         sk.to_world_grid(grid, sk.VIEWPOINTS["front"])
 
 
+@pytest.mark.parametrize("angles", [(np.inf, 20.0), (30.0, -np.inf), (np.nan, 0.0)])
+def test_cameras_at_no_angle_are_refused(angles: tuple[float, float]) -> None:
+    with pytest.raises(ValueError, match="must be finite"):
+        sk.Camera.orbit(*angles)
+    with pytest.raises(ValueError, match="must be finite"):
+        sk.Camera.orbit(30.0, 20.0, fov_degrees=float("nan"))
+
+
 # Configs
 
 

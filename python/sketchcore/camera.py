@@ -109,6 +109,10 @@ class Camera:
                 plane stands at a twentieth of it.
             fov_degrees: field of view in degrees.
         """
+        if not all(math.isfinite(angle) for angle in (azimuth, elevation, fov_degrees)):
+            raise ValueError(
+                f"azimuth, elevation and field of view must be finite, got {azimuth}, {elevation} and {fov_degrees}"
+            )
         if distance is None:
             distance = DISTANCE * _half_sine(FOV_DEGREES) / _half_sine(fov_degrees)
         if distance <= 0:
