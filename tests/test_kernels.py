@@ -45,6 +45,10 @@ KERNELS = {
     "carve": (_core.carve, {"drawings": DRAWINGS, "cameras": CAMERAS}),
     "evidence_fields": (_core.evidence_fields, {"drawings": DRAWINGS}),
     "evidence": (_core.evidence, {"fields": FIELDS, "cameras": CAMERAS}),
+    "heed_outlines": (
+        _core.heed_outlines,
+        {"volume": VOLUMES[0], "depths": VOLUMES[:, 0].copy(), "cameras": CAMERAS, "hull": np.zeros((64, 64, 32), np.uint8)},
+    ),
     "lift": (_core.lift, {"features": np.zeros((2, 65536, 2), np.float32), "cameras": CAMERAS}),
     "lift_transposed": (
         _core.lift_transposed,
@@ -178,6 +182,7 @@ def test_counts_must_agree():
         ("to_world_grid", {"into": VOLUMES[:1].copy()}),
         ("carve", {"cameras": CAMERAS[:1]}),
         ("evidence", {"fields": FIELDS[:1]}),
+        ("heed_outlines", {"depths": VOLUMES[:1, 0].copy()}),
         ("lift", {"features": np.zeros((1, 65536, 2), np.float32)}),
         ("lift_transposed", {"gradient": np.zeros((1, 16384, 2), np.float32)}),
     ):

@@ -79,3 +79,14 @@ def test_thousands_of_pieces_are_joined_as_well():
     joined = join_pieces(volume)
     assert len(pieces(volume)) > 10_000
     assert len(pieces(joined)) == 1
+
+
+def test_a_part_and_its_mirror_image_are_two_pieces_unless_they_touch():
+    apart = np.full((64, 64, 64), 0.2, np.float32)
+    apart[20:40, 20:40, 40:50] = apart[20:40, 20:40, 14:24] = 0.9
+    joined = join_pieces(apart)
+    assert len(pieces(apart)) == 2
+    assert len(pieces(joined)) == 1
+    touching = apart.copy()
+    touching[20:40, 20:40, 24:40] = 0.9
+    assert join_pieces(touching) is touching

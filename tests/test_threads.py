@@ -31,6 +31,7 @@ MESH = trimesh.creation.icosphere(3)
 VOLUME = np.random.default_rng(0).random((2, 64, 64, 64), np.float32)
 VIEWS = [CAMERA, sk.VIEWPOINTS["top"]]
 PACKED = np.stack([view.packed for view in VIEWS])
+HULL = np.full((64, 64, 32), 128, np.uint8)
 FEATURES = np.random.default_rng(1).random((2, 64 * 64 * 16, 4), np.float32)
 DRAWINGS = BATCH.drawings[0]
 
@@ -49,6 +50,7 @@ CALLS: dict[str, Callable[[], Any]] = {
     "carve": lambda: sk.carve(DRAWINGS, VIEWS),
     "silhouette": lambda: sk.silhouette(DRAWINGS[0]),
     "evidence": lambda: _core.evidence(_core.evidence_fields(DRAWINGS), PACKED),
+    "heed_outlines": lambda: _core.heed_outlines(VOLUME[0], VOLUME[:, 0].copy(), PACKED, HULL),
     "lift": lambda: _core.lift(FEATURES, PACKED),
     "lift_transposed": lambda: _core.lift_transposed(_core.lift(FEATURES, PACKED).reshape(2, 16384, 8), PACKED),
     "lift_taps": lambda: _core.lift_taps(PACKED[:1]),

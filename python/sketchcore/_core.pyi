@@ -25,6 +25,7 @@ __all__ = [
     "fit",
     "frustum",
     "generate",
+    "heed_outlines",
     "hidden_lines",
     "isosurface",
     "lift",
@@ -117,6 +118,18 @@ def silhouettes(drawings: NDArray[np.uint8]) -> NDArray[np.uint8]: ...
 def carve(drawings: NDArray[np.uint8], cameras: NDArray[np.float64]) -> NDArray[np.uint8]: ...
 def evidence_fields(drawings: NDArray[np.uint8]) -> NDArray[np.uint8]: ...
 def evidence(fields: NDArray[np.uint8], cameras: NDArray[np.float64]) -> NDArray[np.uint8]: ...
+def heed_outlines(
+    volume: NDArray[np.float32], depths: NDArray[np.float32], cameras: NDArray[np.float64], hull: NDArray[np.uint8]
+) -> NDArray[np.float32]:
+    """The volume with outlines filled and what lies beyond them cleared.
+
+    Args:
+        volume: [64, 64, 64] (x, y, z), probabilities, symmetric about z = 0.
+        depths: [n, 64, 64] (row, col), how far inside each drawing's outline a cell of its camera's grid is: pixels.
+        cameras: [n, 15].
+        hull: [64, 64, 32], the first part of `evidence`.
+    """
+
 def lift(features: NDArray[np.float32], cameras: NDArray[np.float64]) -> NDArray[np.float32]: ...
 def lift_transposed(gradient: NDArray[np.float32], cameras: NDArray[np.float64]) -> NDArray[np.float32]: ...
 def lift_taps(cameras: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float32]]: ...

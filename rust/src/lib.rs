@@ -13,6 +13,7 @@
 //! drawing -> distance -> carve, evidence                     what drawings say about space
 //! resample, lift                                             world grid <-> camera grid, <- image features
 //! convolution -> network                                     drawings -> what is probably there, world grid
+//! outlines                                                   what drawings ask of a volume
 //! isosurface                                                 a volume as a camera sees it
 //! mesh                                                       the surface that leaves the package
 //! ```
@@ -32,6 +33,7 @@ mod dispatch;
 pub mod distance;
 pub mod error;
 pub mod evidence;
+mod exponential;
 pub mod fit;
 pub mod grammar;
 pub mod hatching;
@@ -42,6 +44,7 @@ pub mod lift;
 pub mod lines;
 pub mod mesh;
 pub mod network;
+pub mod outlines;
 pub mod pen;
 #[cfg(feature = "python")]
 mod python;

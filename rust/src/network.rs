@@ -10,7 +10,6 @@ mod block;
 mod decoder;
 mod dense;
 mod encoder;
-mod exponential;
 mod norm;
 mod reading;
 mod spare;

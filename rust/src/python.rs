@@ -47,7 +47,7 @@ mod _core {
     #[pymodule_export]
     use super::convolution::{convolve, convolve_transposed, filter_gradient_of};
     #[pymodule_export]
-    use super::drawings::{carve, evidence, evidence_fields, silhouettes};
+    use super::drawings::{carve, evidence, evidence_fields, heed_outlines, silhouettes};
     #[pymodule_export]
     use super::lift::{lift, lift_taps, lift_transposed};
     #[pymodule_export]

@@ -53,21 +53,14 @@ fn each_plane<const N: usize>(
     let cells = cameras.len() * N * N * N;
     assert_eq!((volumes.len(), out.len()), (cells, cells));
     let fill_grid = |((volume, out), camera): ((&Grid<N>, &mut Grid<N>), &Camera)| {
-        let spare = if N <= KEPT { SPARE.take() } else { None };
-        let mut padded: Box<Padded<N>> = spare.and_then(|spare| spare.downcast().ok()).unwrap_or_default();
-        let finite = pad(volume, &mut padded);
-        if finite {
-            let fill = |(i, plane): (usize, &mut Plane<N>)| fill_plane(&padded, camera, i, plane);
+        with_padded(volume, |padded| {
+            let fill = |(i, plane): (usize, &mut Plane<N>)| fill_plane(padded, camera, i, plane);
             if cameras.len() == 1 && N <= 64 {
                 out.iter_mut().enumerate().for_each(fill);
             } else {
                 out.par_iter_mut().enumerate().for_each(fill);
             }
-        }
-        if N <= KEPT {
-            SPARE.set(Some(padded));
-        }
-        if finite { Ok(()) } else { Err(CoreError::NotFinite { what: "volume" }) }
+        })
     };
     let volumes: &[Grid<N>] = volumes.as_chunks().0.as_chunks().0.as_chunks().0;
     let out: &mut [Grid<N>] = out.as_chunks_mut().0.as_chunks_mut().0.as_chunks_mut().0;
@@ -75,6 +68,61 @@ fn each_plane<const N: usize>(
         return volumes.iter().zip(out).zip(cameras).try_for_each(fill_grid);
     }
     volumes.par_iter().zip(out).zip(cameras).try_for_each(fill_grid)
+}
+
+/// Calls `read` with a padded copy of a volume, unless that is not finite.
+fn with_padded<const N: usize>(volume: &Grid<N>, read: impl FnOnce(&Padded<N>)) -> Result<(), CoreError> {
+    let spare = if N <= KEPT { SPARE.take() } else { None };
+    let mut padded: Box<Padded<N>> = spare.and_then(|spare| spare.downcast().ok()).unwrap_or_default();
+    let finite = pad(volume, &mut padded);
+    if finite {
+        read(&padded);
+    }
+    if N <= KEPT {
+        SPARE.set(Some(padded));
+    }
+    if finite { Ok(()) } else { Err(CoreError::NotFinite { what: "volume" }) }
+}
+
+/// The greatest of what `to_camera_grid` would read along each ray `[row, col]` of each camera, in a volume that is
+/// nowhere negative.
+///
+/// Refuses a volume that is not finite; `out` holds anything then.
+pub fn greatest_along_rays<const N: usize>(
+    world: &[f32],
+    cameras: &[Camera],
+    out: &mut [f32],
+) -> Result<(), CoreError> {
+    let worlds: &[Grid<N>] = world.as_chunks().0.as_chunks().0.as_chunks().0;
+    let out: &mut [Plane<N>] = out.as_chunks_mut().0.as_chunks_mut().0;
+    assert_eq!((world.len(), worlds.len(), out.len()), (N * N * N, 1, cameras.len()));
+    with_padded(&worlds[0], |world| {
+        let threads = rayon::current_num_threads();
+        for (camera, out) in cameras.iter().zip(out) {
+            let parts: Vec<Box<[Plane<N>; 2]>> = (0..threads)
+                .into_par_iter()
+                .map(|part| {
+                    let mut planes = Box::new([[[0.0; N]; N]; 2]);
+                    for slice in N * part / threads..N * (part + 1) / threads {
+                        let [most, plane] = planes.as_mut();
+                        camera_plane(world, camera, slice, plane);
+                        raise(most, plane);
+                    }
+                    planes
+                })
+                .collect();
+            *out = [[0.0; N]; N];
+            parts.iter().for_each(|part| raise(out, &part[0]));
+        }
+    })
+}
+
+for_each_instruction_set! {
+    fn raise<const N: usize>(most: &mut Plane<N>, plane: &Plane<N>) {
+        for (most, &value) in most.as_flattened_mut().iter_mut().zip(plane.as_flattened()) {
+            *most = most.max(value);
+        }
+    }
 }
 
 /// Padded copies up to this side are kept: 9 MB, where the next size would hold 69 MB in every thread.

@@ -64,7 +64,8 @@ class CompactModel:
         return seen
 
     def rounds(self, sketches: Sketches, iterations: int, start: Volume | None = None) -> Iterator[Volume]:
-        said: tuple[list[Cells], list[Cells]] = [], []  # of the world as it is, and mirrored along x
+        # How many answers there are, and their mean: of the world as it is, and mirrored along x.
+        said: dict[bool, tuple[int, Cells]] = {}
         known = None if start is None else fold(0.5 * (start + start[:, :, ::-1])[:, :, 32:])
         mean = known
         reading, answer = self._look(sketches)
@@ -76,8 +77,9 @@ class CompactModel:
                 [readings[look]] = self.passes.read([reduce(Sketches.mirrored, look, sketches)])
             if mean is not None:
                 answer = turn(self.passes.decide([readings[look]], turn(mean)[None], [len(sketches)])[0])
-            said[0 in look].append(answer)
-            mean = np.mean([np.mean(kind, axis=0) for kind in said if kind], axis=0, dtype=np.float32)
+            count, own = said.get(0 in look, (0, answer))
+            said[0 in look] = count + 1, own + (answer - own) / np.float32(count + 1)
+            mean = sum(own for _, own in said.values()) / np.float32(len(said))
             if known is not None:  # one prediction among those of the drawings
                 mean = (known + (number + 1) * mean) / np.float32(number + 2)
             yield join_pieces(heed_outlines(whole(mean), sketches))

@@ -35,7 +35,11 @@ def join_pieces(volume: Volume) -> Volume:
     Returns:
         float32 [64, 64, 64], symmetric as well; the same array if it is in one piece.
     """
-    labels, count = label(volume > 0.5)
+    occupied = volume > 0.5
+    half = occupied[:, :, 32:]
+    if half[:, :, 0].any() and label(half)[1] == 1:  # one piece that reaches its mirror image
+        return volume
+    labels, count = label(occupied)
     if count < 2:
         return volume
     sizes = np.bincount(labels.ravel())

@@ -1,11 +1,11 @@
 //! Self-attention over all cells of a coarse image or volume.
 
-use super::exponential::exponential;
 use super::norm::EPSILON;
 use super::weights::Weights;
 use crate::convolution::{Convolution, multiply};
 use crate::dispatch::for_each_instruction_set;
 use crate::error::CoreError;
+use crate::exponential::exponential;
 use rayon::prelude::*;
 
 /// Attention heads.

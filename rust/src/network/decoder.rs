@@ -3,13 +3,13 @@
 use super::attention::Attention;
 use super::block::{Block, Kind, add_twice};
 use super::dense::Dense;
-use super::exponential::sigmoid;
 use super::reading::{EVIDENCE, VOXELS, inputs};
 use super::weights::Weights;
 use super::widths::Widths;
 use crate::convolution::Convolution;
 use crate::dispatch::for_each_instruction_set;
 use crate::error::CoreError;
+use crate::exponential::sigmoid;
 use crate::lift::HALF;
 use rayon::prelude::*;
 

@@ -1,9 +1,9 @@
-//! What drawings say about space.
+//! What drawings say about space, and what they ask of a volume.
 
-use super::arrays::{DRAWINGS, cameras_of, checked, grid, same_count};
+use super::arrays::{DRAWINGS, all_finite, cameras_of, checked, filled, grid, same_count};
 use crate::camera::IMAGE;
 use crate::voxel::{CELLS, SIDE};
-use crate::{carve as carving, evidence as fields};
+use crate::{carve as carving, evidence as fields, outlines};
 use numpy::{IntoPyArray, PyArray1, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -68,4 +68,22 @@ pub fn evidence<'py>(
     let mut out = vec![0; 3 * CELLS / 2];
     py.detach(|| fields::gather(fields, &cameras, &mut out));
     PyArray1::from_vec(py, out).reshape(vec![3, SIDE, SIDE, SIDE / 2])
+}
+
+#[pyfunction]
+pub fn heed_outlines<'py>(
+    py: Python<'py>,
+    volume: PyReadonlyArrayDyn<'py, f32>,
+    depths: PyReadonlyArrayDyn<'py, f32>,
+    cameras: PyReadonlyArrayDyn<'py, f64>,
+    hull: PyReadonlyArrayDyn<'py, u8>,
+) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+    let cameras = cameras_of(&cameras)?;
+    let side = SIDE as isize;
+    let volume = checked(&volume, "volume", &[side, side, side])?;
+    let depths = checked(&depths, "depths", &[-1, side, side])?;
+    same_count("depths", depths.len() / outlines::RAYS, cameras.len())?;
+    let hull = checked(&hull, "hull", &[side, side, side / 2])?;
+    all_finite(depths, "depths")?;
+    filled(py, None, &[SIDE; 3], |out| outlines::heed(volume, depths, &cameras, hull, out))
 }

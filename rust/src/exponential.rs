@@ -1,4 +1,4 @@
-//! Exponentials many at a time: the standard library's are computed one after the other.
+//! Exponentials and logarithms many at a time: the standard library's are computed one after the other.
 
 use crate::dispatch::for_each_instruction_set;
 
@@ -26,6 +26,35 @@ pub fn exponential(x: f32) -> f32 {
     (polynomial * r * r + r + 1.0) * scale
 }
 
+/// The square root of one half, of which `logarithm` counts the doublings.
+const ROOT: u32 = std::f32::consts::FRAC_1_SQRT_2.to_bits();
+/// Of the polynomial for `ln(1 + f) - f + f^2 / 2` over `f` cubed, the highest power first (Cephes).
+const LOGARITHM: [f32; 9] = [
+    7.037_683_6e-2,
+    -1.151_461e-1,
+    1.167_699_9e-1,
+    -1.242_014_1e-1,
+    1.424_932_3e-1,
+    -1.666_805_7e-1,
+    2.000_071_5e-1,
+    -2.499_999_4e-1,
+    3.333_333e-1,
+];
+
+/// The natural logarithm of a finite, normal, positive number, to 2^-22 of itself or of 1, where that is more.
+#[inline(always)]
+pub fn logarithm(x: f32) -> f32 {
+    let above = x.to_bits().wrapping_sub(ROOT);
+    let doublings = (above as i32 >> 23) as f32;
+    let f = f32::from_bits((above & 0x007f_ffff) + ROOT) - 1.0;
+    let mut polynomial = LOGARITHM[0];
+    for power in &LOGARITHM[1..] {
+        polynomial = polynomial * f + power;
+    }
+    let small = polynomial * f * f * f + doublings * LN_2[1] - 0.5 * f * f;
+    f + small + doublings * LN_2[0]
+}
+
 for_each_instruction_set! {
 /// Logits become probabilities.
 pub fn sigmoid(values: &mut [f32]) {
@@ -47,6 +76,17 @@ mod tests {
             let off = (f64::from(exponential(x)) - exact) / exact;
             assert!(off.abs() < 2.4e-7, "{x}: {off}");
         }
+    }
+
+    #[test]
+    fn logarithms_are_those_of_the_standard_library() {
+        for i in -87_000..=88_000 {
+            let x = (f64::from(i) / 1000.0).exp() as f32;
+            let exact = f64::from(x).ln();
+            let off = (f64::from(logarithm(x)) - exact) / exact.abs().max(1.0);
+            assert!(off.abs() < 2.4e-7, "{x}: {off}");
+        }
+        assert_eq!(logarithm(1.0), 0.0);
     }
 
     #[test]
