@@ -11,12 +11,15 @@ use crate::carve::{INK, silhouette};
 use crate::distance::{REACH, squared_distance};
 use crate::voxel::{CELLS, SIDE, voxel_center};
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 use std::sync::LazyLock;
 
 /// Bytes of one drawing's fields: signed silhouette distance and nearness to ink, one pair a pixel.
 pub const FIELDS: usize = 2 * IMAGE * IMAGE;
 /// Voxels along z of the half grid.
 const DEEP: usize = SIDE / 2;
+/// Voxels of the half grid in a plane across x.
+const PLANE: usize = SIDE * DEEP;
 /// Steps of a byte for one pixel of distance.
 const STEPS: f32 = 8.0;
 
@@ -57,9 +60,10 @@ pub fn gather(fields: &[u8], cameras: &[Camera], out: &mut [u8]) {
     let (mean, least) = rest.split_at_mut(CELLS / 2);
     let heights: [f32; DEEP] = std::array::from_fn(|k| voxel_center(k + DEEP) as f32);
     let share = 0.5 / cameras.len().max(1) as f32;
-    for x in 0..SIDE {
+    let planes = hull.par_chunks_mut(PLANE).zip(mean.par_chunks_mut(PLANE)).zip(least.par_chunks_mut(PLANE));
+    planes.with_min_len(8).enumerate().for_each(|(x, ((hull, mean), least))| {
         for y in 0..SIDE {
-            let column = (x * SIDE + y) * DEEP..(x * SIDE + y + 1) * DEEP;
+            let column = y * DEEP..(y + 1) * DEEP;
             let (hull, least) = (&mut hull[column.clone()], &mut least[column.clone()]);
             hull.fill(255);
             least.fill(255);
@@ -84,7 +88,7 @@ pub fn gather(fields: &[u8], cameras: &[Camera], out: &mut [u8]) {
                 *m = (t as f32 * share).round() as u8;
             }
         }
-    }
+    });
 }
 
 const OUTSIDE: u32 = u32::MAX;
