@@ -47,7 +47,12 @@ KERNELS = {
     "evidence": (_core.evidence, {"fields": FIELDS, "cameras": CAMERAS}),
     "heed_outlines": (
         _core.heed_outlines,
-        {"volume": VOLUMES[0], "depths": VOLUMES[:, 0].copy(), "cameras": CAMERAS, "hull": np.zeros((64, 64, 32), np.uint8)},
+        {
+            "volume": VOLUMES[0],
+            "depths": VOLUMES[:, 0].copy(),
+            "cameras": CAMERAS,
+            "hull": np.zeros((64, 64, 32), np.uint8),
+        },
     ),
     "lift": (_core.lift, {"features": np.zeros((2, 65536, 2), np.float32), "cameras": CAMERAS}),
     "lift_transposed": (

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, binary_erosion, gaussian_filter
+from scipy.ndimage import binary_dilation, binary_erosion
 
-from reference import cameras, to_camera_grid, to_world_grid
+import reference_outlines
+from reference import cameras
 from sketchcore import VIEWPOINTS, Cuboid, Shape, _core, draw, iou, voxelize
 from sketchcore.camera import pack_cameras
 from sketchcore.nets.outlines import heed_outlines
@@ -67,24 +68,6 @@ def test_what_no_outline_holds_is_cleared_where_the_network_hardly_believes_in_i
     assert cleared[truth == 1].all()
 
 
-def heeded_slowly(volume, depths, views, hull):
-    """The twin of the kernel, float64; and which voxels of the half grid lie so near a frustum's border that what is
-    read there depends on how borders are read."""
-    known = np.clip(volume[:, :, 32:].astype(np.float64), 1 / (1 + np.exp(12)), 1 - 1 / (1 + np.exp(12)))
-    logits = np.log(known / (1 - known))
-    above = np.concatenate([logits[:, :, ::-1], logits], axis=2) + 12  # nothing is outside
-    missing, close = np.zeros((64, 64, 64)), np.zeros((64, 64, 64), bool)
-    for pixels, camera in zip(depths, views, strict=True):
-        along = to_camera_grid(above, camera).max(axis=0) - 12
-        asked = np.minimum(0.6 * (pixels - 0.5), 0.4)
-        lack = gaussian_filter(np.where(pixels > 0, np.clip(asked - along, 0, 2), 0), 0.5)
-        seen, margin = to_world_grid(np.broadcast_to(lack, (64, 64, 64)), camera, np.zeros((64, 64, 64)))
-        missing, close = np.maximum(missing, seen), close | (margin < 0.51)
-    missing, close = (both(a[:, :, 32:], a[:, :, 31::-1]) for both, a in ((np.maximum, missing), (np.logical_or, close)))
-    logits = logits + np.where(hull >= 120, missing, 0) - np.where(hull < 112, np.clip(logits + 0.4, 0, 2), 0)
-    return 1 / (1 + np.exp(-logits)), close
-
-
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.lists(cameras(), min_size=1, max_size=3))
 def test_the_kernel_is_its_twin(seed, views):
@@ -94,7 +77,7 @@ def test_the_kernel_is_its_twin(seed, views):
     depths = random.uniform(-4, 8, (len(views), 64, 64)).astype(np.float32)
     hull = random.integers(100, 140, (64, 64, 32), dtype=np.uint8)
     heeded = _core.heed_outlines(volume, depths, pack_cameras(views), hull)
-    slowly, close = heeded_slowly(volume, depths, views, hull)
+    slowly, close = reference_outlines.heed(volume, depths, views, hull)
     np.testing.assert_array_equal(heeded[:, :, :32], heeded[:, :, :31:-1])
     np.testing.assert_allclose(heeded[:, :, 32:][~close], slowly[~close], atol=2e-4)
     assert close.mean() < 0.6
