@@ -7,7 +7,7 @@ from reference import to_camera_grid, to_world_grid
 
 
 def heed(volume, depths, views, hull):
-    """The half grid z > 0, float64; and which of its voxels are so near a frustum's border that they hang on how it is read."""
+    """The half grid z > 0, float64; and which of its voxels are too near a frustum's border to be compared."""
     known = np.clip(volume[:, :, 32:].astype(np.float64), 1 / (1 + np.exp(12)), 1 - 1 / (1 + np.exp(12)))
     logits = np.log(known / (1 - known))
     above = np.concatenate([logits[:, :, ::-1], logits], axis=2) + 12  # nothing is outside

@@ -1,4 +1,4 @@
-"""What every outline demands of the solid: to be covered where it is drawn, and empty beyond (`rust/src/outlines.rs`)."""
+"""What outlines demand of the solid: to be covered where they are drawn, and empty beyond (`rust/src/outlines.rs`)."""
 
 from __future__ import annotations
 
