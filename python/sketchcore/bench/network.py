@@ -1,4 +1,4 @@
-"""A pass of the compact network by torch, in the precision in which it is fastest on this processor."""
+"""A pass of the compact network by torch."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ from sketchcore.nets.sketches import Sketches
 from sketchcore.nets.weights import PRETRAINED, load_weights
 
 
-def torch_passes(samples: Sequence[Sketches], prior: Cells) -> tuple[Callable[[], object], Callable[[], object]]:
+def torch_passes(
+    samples: Sequence[Sketches], prior: Cells, dtype: torch.dtype
+) -> tuple[Callable[[], object], Callable[[], object]]:
     """Calls that read the drawings of some objects, and that decide on them."""
     weights, _ = load_weights(PRETRAINED)
-    passes = CompactInference(filled(CompactNet, weights, "compact"), torch.device("cpu"))
+    passes = CompactInference(filled(CompactNet, weights, "compact"), torch.device("cpu"), dtype)
     readings, counts = passes.read(samples), [len(s) for s in samples]
     return lambda: passes.read(samples), lambda: passes.decide(readings, prior, counts)

@@ -33,11 +33,12 @@ class CompactInference:
     Args:
         net: the network; it stays as it is.
         device: where to compute.
+        dtype: what to convolve in; None for what is held to be fastest there.
     """
 
-    def __init__(self, net: CompactNet, device: torch.device) -> None:
+    def __init__(self, net: CompactNet, device: torch.device, dtype: torch.dtype | None = None) -> None:
         self.device = device
-        self.dtype = fast_dtype(device)
+        self.dtype = fast_dtype(device) if dtype is None else dtype
         cast = {id(p): nn.Parameter(p.detach().to(device, self.dtype), False) for p in net.parameters()}
         self._net = place(deepcopy(net, cast), device).eval()
         self._reading = [p.detach().to(device, torch.float32) for p in (net.reading.weight, net.reading.bias)]
