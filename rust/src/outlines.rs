@@ -137,7 +137,7 @@ for_each_instruction_set! {
             for k in 0..DEEP {
                 let logit = column[DEEP + k] - FAR;
                 let raise = if hull[k] >= RAISED { missing[k] } else { 0.0 };
-                let cut = if hull[k] < CLEARED { (logit + MARGIN).max(0.0).min(LIMIT) } else { 0.0 };
+                let cut = if hull[k] < CLEARED { (logit + MARGIN).clamp(0.0, LIMIT) } else { 0.0 };
                 half[k] = 1.0 / (1.0 + exponential(cut - raise - logit));
             }
             let (below, above) = column.split_at_mut(DEEP);
