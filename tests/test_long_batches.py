@@ -63,9 +63,9 @@ from sketchcore.datagen import generate
 signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs in the background ignores it
 seen = []
 def progress(finished):
-    if not seen:
+    seen.append(finished)  # first: the signal may come before the next line
+    if len(seen) == 1:
         print("begun", flush=True)
-    seen.append(finished)
 
 try:
     generate(4, 4000, config={"frustum_rays": 4}, threads=2, progress=progress)
