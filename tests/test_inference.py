@@ -8,7 +8,7 @@ import torch
 
 import sketchcore as sk
 from sketchcore.evaluate.testset import load_testset
-from sketchcore.nets import cells, inference
+from sketchcore.nets import cells
 from sketchcore.nets.compact import CompactNet
 from sketchcore.nets.compactmodel import BATCH, CompactModel
 from sketchcore.nets.decoder import fold
@@ -31,14 +31,11 @@ def native(net: CompactNet) -> CompactNative:
     return CompactNative({name: tensor.numpy() for name, tensor in net.state_dict().items()}, net.config)
 
 
-def both(
-    net: CompactNet, batch: list[Chain], dtype: torch.dtype | None, monkeypatch: pytest.MonkeyPatch
-) -> list[np.ndarray]:
+def both(net: CompactNet, batch: list[Chain], dtype: torch.dtype | None) -> list[np.ndarray]:
     """Probabilities [B, 64, 64, 32] by the network itself in float32, and by its inference."""
     with torch.inference_mode():
         plain = net(**compact_inputs(batch, CPU)).sigmoid()
-    monkeypatch.setattr(inference, "fast_dtype", lambda device: dtype)
-    ours: Passes = native(net) if dtype is None else CompactInference(net, CPU)
+    ours: Passes = native(net) if dtype is None else CompactInference(net, CPU, dtype)
     samples = [chain.sketches for chain in batch]
     prior = np.stack([cells.fold(chain.prior) for chain in batch])
     made = ours.decide(ours.read(samples), prior if batch[0].depth else None, [len(s) for s in samples])
@@ -49,19 +46,17 @@ def both(
 @pytest.mark.parametrize("dtype", BOUNDS)
 @pytest.mark.parametrize("depth", [0, 1])
 @pytest.mark.parametrize("counts", [(1,), (2, 1, 4)])
-def test_it_answers_as_the_network_does(
-    counts: tuple[int, ...], depth: int, dtype: torch.dtype | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    plain, ours = both(awake(CompactNet(TINY)), chains(counts, depth), dtype, monkeypatch)
+def test_it_answers_as_the_network_does(counts: tuple[int, ...], depth: int, dtype: torch.dtype | None) -> None:
+    plain, ours = both(awake(CompactNet(TINY)), chains(counts, depth), dtype)
     assert plain.std() > 0.05, "a network that says the same everywhere shows nothing"
     np.testing.assert_allclose(ours, plain, atol=BOUNDS[dtype])
 
 
 @pytest.mark.parametrize("dtype", BOUNDS)
-def test_the_weights_that_ship_lose_nothing(dtype: torch.dtype | None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_weights_that_ship_lose_nothing(dtype: torch.dtype | None) -> None:
     weights, _ = load_weights(PRETRAINED)
     net = filled(CompactNet, weights, "compact")
-    plain, ours = both(net.eval(), chains((1, 3)), dtype, monkeypatch)
+    plain, ours = both(net.eval(), chains((1, 3)), dtype)
     assert np.abs(plain - ours).mean() < 0.01 * BOUNDS[dtype] / 0.05
     assert crossing(plain, ours) < 0.01
 

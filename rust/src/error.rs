@@ -58,3 +58,10 @@ pub enum CoreError {
     #[error("the batch was stopped before it was finished")]
     Stopped,
 }
+
+/// Refuses numbers of which one is NaN or infinite.
+pub fn all_finite(values: &[f32], what: &'static str) -> Result<(), CoreError> {
+    // Without a way out of the inner loop it vectorises.
+    let finite = |values: &[f32]| values.iter().fold(true, |finite, v| finite & (v.abs() < f32::INFINITY));
+    if values.chunks(4096).all(finite) { Ok(()) } else { Err(CoreError::NotFinite { what }) }
+}

@@ -8,20 +8,20 @@
 
 use crate::camera::{Camera, IMAGE};
 use crate::carve::{INK, silhouette};
+use crate::column::{Column, DEEP};
 use crate::distance::{REACH, squared_distance};
-use crate::voxel::{CELLS, SIDE, voxel_center};
-use glam::{DVec3, Vec3};
+use crate::voxel::{CELLS, SIDE};
 use rayon::prelude::*;
 use std::sync::LazyLock;
 
 /// Bytes of one drawing's fields: signed silhouette distance and nearness to ink, one pair a pixel.
 pub const FIELDS: usize = 2 * IMAGE * IMAGE;
-/// Voxels along z of the half grid.
-const DEEP: usize = SIDE / 2;
 /// Voxels of the half grid in a plane across x.
 const PLANE: usize = SIDE * DEEP;
-/// Steps of a byte for one pixel of distance.
-const STEPS: f32 = 8.0;
+/// The signed distance of an outline.
+pub const BORDER: u8 = 128;
+/// What that distance grows by in one pixel, inwards.
+pub const PIXEL: u8 = 8;
 
 /// Distance in steps for each squared distance within reach.
 static DISTANCE: LazyLock<Vec<f32>> = LazyLock::new(|| {
@@ -43,8 +43,8 @@ pub fn fill_fields(drawing: &[u8], out: &mut [u8]) {
     let distance = |d: u16| DISTANCE[usize::from(d).min(DISTANCE.len() - 1)];
     for (i, pair) in out.chunks_exact_mut(2).enumerate() {
         let signed = if inside[i] { distance(to_out[i]) - 0.5 } else { 0.5 - distance(to_in[i]) };
-        pair[0] = (128.0 + STEPS * signed).round().clamp(0.0, 255.0) as u8;
-        pair[1] = (255.0 - 2.0 * STEPS * distance(to_ink[i])).round().max(0.0) as u8;
+        pair[0] = (f32::from(BORDER) + f32::from(PIXEL) * signed).round().clamp(0.0, 255.0) as u8;
+        pair[1] = (255.0 - 2.0 * f32::from(PIXEL) * distance(to_ink[i])).round().max(0.0) as u8;
     }
 }
 
@@ -58,7 +58,6 @@ pub fn gather(fields: &[u8], cameras: &[Camera], out: &mut [u8]) {
     assert_eq!(out.len(), 3 * CELLS / 2);
     let (hull, rest) = out.split_at_mut(CELLS / 2);
     let (mean, least) = rest.split_at_mut(CELLS / 2);
-    let heights: [f32; DEEP] = std::array::from_fn(|k| voxel_center(k + DEEP) as f32);
     let share = 0.5 / cameras.len().max(1) as f32;
     let planes = hull.par_chunks_mut(PLANE).zip(mean.par_chunks_mut(PLANE)).zip(least.par_chunks_mut(PLANE));
     planes.with_min_len(8).enumerate().for_each(|(x, ((hull, mean), least))| {
@@ -68,12 +67,9 @@ pub fn gather(fields: &[u8], cameras: &[Camera], out: &mut [u8]) {
             hull.fill(255);
             least.fill(255);
             let mut total = [0u32; DEEP];
-            let foot = DVec3::new(voxel_center(x), voxel_center(y), 0.0);
             for (camera, field) in cameras.iter().zip(fields.chunks_exact(FIELDS)) {
-                let start = camera.to_camera(foot).as_vec3();
-                for side in [1.0, -1.0] {
-                    let step = camera.to_camera(camera.position + side * DVec3::Z).as_vec3();
-                    for (k, &pixel) in pixels_along(start, step, &heights, camera).iter().enumerate() {
+                for column in Column::seen_by(camera, x, y) {
+                    for (k, &pixel) in pixels_of(&column, camera).iter().enumerate() {
                         let (signed, nearness) = match pixel {
                             OUTSIDE => (0, 0),
                             _ => (field[2 * pixel as usize], field[2 * pixel as usize + 1]),
@@ -93,12 +89,12 @@ pub fn gather(fields: &[u8], cameras: &[Camera], out: &mut [u8]) {
 
 const OUTSIDE: u32 = u32::MAX;
 
-/// The pixel that each point `start + height * step` (camera coordinates) falls into.
-fn pixels_along(start: Vec3, step: Vec3, heights: &[f32; DEEP], camera: &Camera) -> [u32; DEEP] {
+/// The pixel that each voxel of a column falls into.
+fn pixels_of(column: &Column, camera: &Camera) -> [u32; DEEP] {
     let half = 0.5 * IMAGE as f32;
     let focal = half / camera.half_image as f32;
-    heights.map(|height| {
-        let p = start + step * height;
+    std::array::from_fn(|k| {
+        let p = column.center(k);
         let scale = focal / p.z;
         let (x, y) = (p.x * scale + half, p.y * scale + half);
         let seen = p.z > 0.0 && x >= 0.0 && y >= 0.0 && x < IMAGE as f32 && y < IMAGE as f32;

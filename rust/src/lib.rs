@@ -18,7 +18,7 @@
 //! mesh                                                       the surface that leaves the package
 //! ```
 //!
-//! `raycast` asks `intersect` about each primitive; `dispatch` compiles the loops for several instruction sets.
+//! `raycast` asks `intersect` about each primitive, `evidence` and `outlines` where a `column` of voxels is seen; `dispatch` compiles the loops for several instruction sets.
 //!
 //! Only `python` knows about Python; everything else is plain Rust that `cargo test` runs.
 
@@ -27,6 +27,7 @@ pub mod brush;
 pub mod buffers;
 pub mod camera;
 pub mod carve;
+mod column;
 pub mod convolution;
 pub mod csg;
 mod dispatch;

@@ -5,12 +5,13 @@
 //! probabilities still say where along the ray the solid is most likely, so that is where it is raised.
 
 use crate::camera::Camera;
+use crate::column::{Column, DEEP};
 use crate::dispatch::for_each_instruction_set;
-use crate::error::CoreError;
+use crate::error::{CoreError, all_finite};
+use crate::evidence::{BORDER, PIXEL};
 use crate::exponential::{exponential, logarithm};
 use crate::resample::greatest_along_rays;
-use crate::voxel::{CELLS, SIDE, voxel_center};
-use glam::{DVec3, Vec3};
+use crate::voxel::{CELLS, SIDE};
 use rayon::prelude::*;
 
 /// How far beyond 0 the logits are moved, for the surface is interpolated between voxels.
@@ -26,14 +27,12 @@ const LIMIT: f32 = 2.0;
 /// Logits are between -FAR and FAR.
 const FAR: f32 = 12.0;
 /// A pixel outside the outline of some drawing, in the hull's steps: up to here, voxels are raised.
-const RAISED: u8 = 128 - 8;
+const RAISED: u8 = BORDER - PIXEL;
 /// Two pixels outside: beyond, they are cleared.
-const CLEARED: u8 = 128 - 16;
+const CLEARED: u8 = BORDER - 2 * PIXEL;
 
 /// Cells of an image of the camera grid.
 pub const RAYS: usize = SIDE * SIDE;
-/// Voxels along z of the half grid.
-const DEEP: usize = SIDE / 2;
 /// Cells of an image with a border of zeros.
 const WIDE: usize = SIDE + 2;
 
@@ -53,9 +52,7 @@ pub fn heed(
 ) -> Result<(), CoreError> {
     assert_eq!((volume.len(), out.len(), hull.len()), (CELLS, CELLS, CELLS / 2));
     assert_eq!(depths.len(), cameras.len() * RAYS);
-    if !volume.iter().fold(true, |finite, p| finite & p.is_finite()) {
-        return Err(CoreError::NotFinite { what: "volume" });
-    }
+    all_finite(volume, "volume")?;
     // Until the end `out` has logits, all positive: outside the grid is 0, and there is nothing.
     let planes = |out: &mut [f32], change: &(dyn Fn(usize, &mut [f32]) + Sync)| {
         out.par_chunks_mut(RAYS).with_min_len(4).enumerate().for_each(|(x, plane)| change(x, plane));
@@ -122,14 +119,11 @@ for_each_instruction_set! {
     fn move_logits(x: usize, lacks: &[Image], cameras: &[Camera], hull: &[u8], plane: &mut [f32]) {
         let columns = plane.chunks_exact_mut(SIDE).zip(hull.chunks_exact(DEEP));
         for (y, (column, hull)) in columns.enumerate() {
-            let foot = DVec3::new(voxel_center(x), voxel_center(y), 0.0);
             let mut missing = [0.0; DEEP];
             if hull.iter().any(|&hull| hull >= RAISED) {
                 for (camera, lack) in cameras.iter().zip(lacks) {
-                    let start = camera.to_camera(foot).as_vec3();
-                    for side in [1.0, -1.0] {
-                        let step = camera.to_camera(camera.position + side * DVec3::Z).as_vec3();
-                        raise(start, step, camera, lack, &mut missing);
+                    for column in Column::seen_by(camera, x, y) {
+                        raise(&column, camera, lack, &mut missing);
                     }
                 }
             }
@@ -147,17 +141,16 @@ for_each_instruction_set! {
     }
 }
 
-/// Raises `missing` to what is lacking along the rays through each point `start + height * step` (camera coordinates).
+/// Raises `missing` to what is lacking along the rays through a column's voxels.
 #[inline(always)]
-fn raise(start: Vec3, step: Vec3, camera: &Camera, lack: &Image, missing: &mut [f32; DEEP]) {
+fn raise(column: &Column, camera: &Camera, lack: &Image, missing: &mut [f32; DEEP]) {
     let half = 0.5 * SIDE as f32;
     let focal = half / camera.half_image as f32;
     let (near, far) = (camera.near as f32, camera.far as f32);
     let (mut first, mut right, mut down) = ([0; DEEP], [0.0; DEEP], [0.0; DEEP]);
     let mut seen = [0.0; DEEP];
     for k in 0..DEEP {
-        let height = (k as f32 + 0.5) / SIDE as f32;
-        let p = start + step * height;
+        let p = column.center(k);
         let scale = focal / p.z;
         let (col, row) = (p.x * scale, p.y * scale);
         let inside = (col.abs() <= half) & (row.abs() <= half) & (p.z >= near) & (p.z <= far);

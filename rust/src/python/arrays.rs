@@ -67,12 +67,6 @@ pub fn same_count(what: &'static str, got: usize, expected: usize) -> Result<(),
     })
 }
 
-pub fn all_finite(values: &[f32], what: &'static str) -> Result<(), CoreError> {
-    // Without a way out of the inner loop it vectorises.
-    let finite = |values: &[f32]| values.iter().fold(true, |finite, v| finite & (v.abs() < f32::INFINITY));
-    if values.chunks(4096).all(finite) { Ok(()) } else { Err(CoreError::NotFinite { what }) }
-}
-
 /// Fills `out`, or a fresh array where there is none, and returns it.
 pub fn filled<'py, T: Element, E: Into<PyErr> + Send>(
     py: Python<'py>,

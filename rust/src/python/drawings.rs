@@ -1,7 +1,8 @@
 //! What drawings say about space, and what they ask of a volume.
 
-use super::arrays::{DRAWINGS, all_finite, cameras_of, checked, filled, grid, same_count};
+use super::arrays::{DRAWINGS, cameras_of, checked, filled, grid, same_count};
 use crate::camera::IMAGE;
+use crate::error::all_finite;
 use crate::voxel::{CELLS, SIDE};
 use crate::{carve as carving, evidence as fields, outlines};
 use numpy::{IntoPyArray, PyArray1, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn};

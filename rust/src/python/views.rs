@@ -1,8 +1,9 @@
 //! What a camera sees of a shape or of a volume.
 
-use super::arrays::{all_finite, camera_of, check_rays, check_size, checked, filled, grid, shape_of};
+use super::arrays::{camera_of, check_rays, check_size, checked, filled, grid, shape_of};
 use crate::buffers::{Buffers, fill_frustum};
 use crate::camera::{Camera, DISTANCE, IMAGE, PACKED, VIEWPOINTS};
+use crate::error::all_finite;
 use crate::lines::{LineConfig, detect};
 use crate::voxel::{CELLS, SIDE};
 use numpy::{

@@ -1,8 +1,8 @@
 //! Volumes: made of a shape, read in another grid, and the surface that leaves the package.
 
-use super::arrays::{all_finite, cameras_of, checked, checked_mut, filled, same_count, shape_of};
+use super::arrays::{cameras_of, checked, checked_mut, filled, same_count, shape_of};
 use crate::camera::Camera;
-use crate::error::CoreError;
+use crate::error::{CoreError, all_finite};
 use crate::mesh::BilateralSettings;
 use crate::resample;
 use crate::voxel::{BitGrid, SIDE};
