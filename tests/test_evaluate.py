@@ -106,6 +106,24 @@ def test_carving_leaves_no_concavity_empty_and_its_early_stop_counts_for_all_rou
         assert {f.mean for f in by_round} == {carving.mean}
 
 
+class Astray(Oracle):
+    """Moves drawings to where they do not belong."""
+
+    def in_place(self, sketches: Sketches, always: bool = False) -> Sketches:
+        return sketches.seen_by(np.stack([sk.VIEWPOINTS["top"].packed] * len(sketches)))
+
+
+def test_drawings_may_stay_where_they_are() -> None:
+    examples = list(load_testset(2))
+    moved = measure_accuracy(Astray(examples), 2)
+    stayed = measure_accuracy(Astray(examples), 2, align=False)
+    assert moved.network[0][5].mean < 0.5
+    assert stayed.network[0][5].mean == pytest.approx(stayed.ceiling.mean)
+    assert stayed.source == "the fixed test set, drawings where they are"
+    with pytest.raises(ValueError, match="robustness takes no --no-align; accuracy takes it"):
+        measure_part("robustness", align=False)
+
+
 class Fading(Oracle):
     """Forgets with every round and with every drawing that comes before the first one."""
 

@@ -29,6 +29,9 @@ def evaluate(
         Path | None,
         typer.Option("--data", help="Data set (sketchcore prepare) whose test split accuracy is measured on instead."),
     ] = None,
+    align: Annotated[
+        bool, typer.Option(help="Move drawings that are plainly out of place; exact ones may all stay (accuracy).")
+    ] = True,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="Folder for PART.json and PART.png, or drawings' pictures.")
     ] = None,
@@ -47,7 +50,7 @@ def evaluate(
         if part not in PARTS:
             raise ValueError(f"unknown part {part!r}; the parts are {', '.join(PARTS)}")
         with progress_bar(part) as show:
-            report = measure_part(part, model, shapes, drawings, out, show, data)
+            report = measure_part(part, model, shapes, drawings, out, show, data, align)
         if out is not None:
             write_part(part, report, out)
     if as_json:

@@ -63,6 +63,7 @@ def measure_accuracy(
     model: Model,
     shapes: int | None = None,
     data: Path | None = None,
+    align: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> Accuracy:
     """Measures a model on the fixed test set, from exact drawings, in the world grid (paper, sections 6.1 and 6.5).
@@ -71,6 +72,8 @@ def measure_accuracy(
         model: the network.
         shapes: the first so many; None for all.
         data: data set of meshes (`sketchcore prepare`) whose test split is measured on instead.
+        align: move drawings that are plainly out of place, as `reconstruct` does where nobody says; False takes all
+            where they are.
         progress: called as `progress(done, total)` after each shape.
 
     Raises:
@@ -84,6 +87,8 @@ def measure_accuracy(
         meshes = Prepared(data)
         source, examples = f"the test split of {meshes.folder.name}", load_meshes(meshes, shapes, progress)
         total = shapes or meshes.count("test")
+    if not align:
+        source += ", drawings where they are"
     network = np.empty((total, VIEWS, ROUNDS + 1))
     concavities, carving, orthogonal = np.empty((3, total, VIEWS))
     ceiling, viewpoint = np.empty((2, total))
@@ -92,7 +97,7 @@ def measure_accuracy(
         hulls = _hulls(example.drawings, list(example.cameras))
         started = time.perf_counter()
         for v in range(VIEWS):
-            volumes = predictions(model, example, v + 1, ROUNDS)
+            volumes = predictions(model, example, v + 1, ROUNDS, align=align)
             network[i, v] = [iou(volume, example.world) for volume in volumes]
             concavities[i, v] = _left_empty(volumes[-1], hulls[v], example.world)
         seconds += time.perf_counter() - started
@@ -125,13 +130,15 @@ def settled(model: Model, drawings: NDArray[np.uint8], cameras: Sequence[Camera]
 
 
 def predictions(
-    model: Model, example: Example, views: int, rounds: int, tolerance: float = TOLERANCE
+    model: Model, example: Example, views: int, rounds: int, tolerance: float = TOLERANCE, align: bool = True
 ) -> list[NDArray[np.float32]]:
     """The volumes of an example's first drawings: the first prediction, then each round's.
 
     Where rounds end early, because the solid has settled, their last volume stands for those that were saved.
     """
-    sketches = model.in_place(Sketches(example.drawings[:views], pack_cameras(example.cameras[:views])))
+    sketches = Sketches(example.drawings[:views], pack_cameras(example.cameras[:views]))
+    if align:
+        sketches = model.in_place(sketches)
     made = list(until_settled(model.rounds(sketches, rounds), tolerance, model.first(views)))
     return made + [made[-1]] * (rounds + 1 - len(made))
 

@@ -32,7 +32,8 @@ class Part:
     Attributes:
         measure: makes its report.
         table: shows it.
-        takes: which of the options "shapes", "data", "folders", "out", and "weights" instead of a model, `measure` has.
+        takes: which of the options "shapes", "data", "align", "folders", "out", and "weights" instead of a model,
+            `measure` has.
         plot: writes it as a PNG; None where there is nothing to plot.
     """
 
@@ -44,7 +45,9 @@ class Part:
 
 PARTS: Mapping[str, Part] = MappingProxyType(
     {
-        "accuracy": Part(measure_accuracy, present.accuracy_table, takes=("shapes", "data"), plot=plot_accuracy),
+        "accuracy": Part(
+            measure_accuracy, present.accuracy_table, takes=("shapes", "data", "align"), plot=plot_accuracy
+        ),
         "convergence": Part(measure_convergence, present.convergence_table, plot=plot_convergence),
         "robustness": Part(measure_robustness, present.robustness_table, plot=plot_robustness),
         "cost": Part(measure_cost, cost_as_table, takes=("shapes", "weights")),
@@ -63,6 +66,7 @@ def measure_part(
     out: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
     data: Path | None = None,
+    align: bool = True,
 ) -> Any:
     """The report of a part.
 
@@ -74,6 +78,7 @@ def measure_part(
         out: folder for the pictures of the parts "drawings" and "failures"; made where it is missing.
         progress: called as `progress(done, total)`.
         data: data set of meshes, for the part "accuracy" alone.
+        align: move drawings that are plainly out of place; False for the part "accuracy" alone.
 
     Raises:
         ValueError: for arguments that the part does not take, or lacks.
@@ -84,13 +89,22 @@ def measure_part(
         raise ValueError(f"{name} takes no --drawings; those are for the part drawings")
     if data is not None and "data" not in part.takes:
         raise ValueError(f"{name} takes no --data: it is measured on the fixed test set; accuracy takes it")
+    if not align and "align" not in part.takes:
+        raise ValueError(f"{name} takes no --no-align; accuracy takes it")
     if shapes is not None and "shapes" not in part.takes:
         raise ValueError(f"{name} takes no --shapes: it is not measured on the test set")
     if not folders and "folders" in part.takes:
         raise ValueError(f"{name} takes one or more --drawings FOLDER")
     if out is not None:
         out.mkdir(exist_ok=True)
-    options: dict[str, Any] = {"shapes": shapes, "data": data, "folders": folders, "out": out, "weights": weights}
+    options: dict[str, Any] = {
+        "shapes": shapes,
+        "data": data,
+        "align": align,
+        "folders": folders,
+        "out": out,
+        "weights": weights,
+    }
     given = {option: options[option] for option in part.takes if options[option] is not None}
     if "weights" not in part.takes:
         given["model"] = load_model(weights)
