@@ -319,6 +319,32 @@ def test_sheets_are_panels_of_one_width_in_a_chain():
     assert 16 < sum(len(shape[shape[:, 1] == 1]) == 3 for shape in half) < 48
 
 
+def test_bars_are_milled_bored_and_mostly_alone():
+    bars = {"share": 1.0, "alone": 1.0, "bored": 1.0, "turned": 1.0, "bore": [0.5, 0.5]}
+    batch = generate(0, 32, config={"grammar": {"bars": bars}})
+    axes = set()
+    for shape, voxels in zip(batch.packed_shapes, batch.world, strict=True):
+        turned, bore = shape[shape[:, 1] == 1], shape[-1]
+        axis = int(bore[0]) - 1
+        axes.add(axis)
+        u, v = (a for a in range(3) if a != axis)
+        assert bore[1] == 0 and 2 <= len(turned) <= 3 and set(turned[1:, 0]) == {19.0 + axis}
+        cuts = shape[(shape[:, 1] == 0) & (shape[:, 0] >= 4)]
+        assert len(cuts) == 4 and {int(kind) // 4 - 1 for kind in cuts[:, 0]} == {axis}
+        # The hole takes half the way from face to face, and one sees through it.
+        sides = shape[(shape[:, 1] == 0) & (shape[:, 0] == 0)]
+        away = np.abs(sides[:, 2:5] - bore[2:5])
+        flats = (away - sides[:, 5:8])[away > 1e-9]
+        assert bore[5 + u] == bore[5 + v]
+        np.testing.assert_allclose(bore[5 + u], 0.5 * flats.min(), rtol=1e-9)
+        middle = np.moveaxis(voxels, axis, 0)[:, 31:33, 31:33]
+        assert not middle.any()
+        assert voxels.any()
+    assert axes == {0, 1, 2}
+    more = generate(0, 64, config={"grammar": {"steps": [3, 3], "bars": {**bars, "alone": 0.5}}}).packed_shapes
+    assert 16 < sum(int(shape[-1, 0]) in (1, 2, 3) and shape[-1, 1] == 0 for shape in more) < 56
+
+
 def test_chamfered_cuboids_lose_edges_along_one_axis():
     only = {"cylinders": 0.0, "subtracted": 0.0, "steps": [1, 1], "chamfered": 1.0, "chamfer": [0.5, 0.5]}
     counts = set()
@@ -406,6 +432,9 @@ def test_the_default_config_is_complete_and_fresh():
         ({"grammar": {"sheets": {"share": 2}}}, r"grammar\.sheets\.share must lie between 0 and 1"),
         ({"grammar": {"sheets": {"panels": [0, 3]}}}, r"grammar\.sheets\.panels must be \[least, most\], from 1"),
         ({"grammar": {"sheets": {"length": [0, 1]}}}, r"grammar\.sheets\.length, .* more than 0"),
+        ({"grammar": {"bars": {"alone": -1}}}, r"grammar\.bars\..*alone.* between 0 and 1"),
+        ({"grammar": {"bars": {"half_length": [0, 1]}}}, r"grammar\.bars\..*half_length.* more than 0"),
+        ({"grammar": {"bars": {"end": [0.5, 1]}}}, r"grammar\.bars\.bore and end must be"),
         ({"hand": {"shift": -1}}, r"hand\.shift must lie between 0 and 256 pixels"),
         ({"hand": {"azimuth": 60}}, "hand: angles must lie between 0 and 45"),
         ({"hand": {"fov": 0.9}}, "fov between 0 and 0.75"),

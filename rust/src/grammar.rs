@@ -1,8 +1,8 @@
 //! The paper's shape grammar (section 4.1): cuboids and cylinders grown onto each other, symmetric about z = 0;
-//! and wedges, cut edges, bores and bent sheets, which are ours, where a config asks for them.
+//! and wedges, cut edges, bores, bent sheets and bars, which are ours, where a config asks for them.
 //!
-//! Only sums, products and comparisons of 64-bit floats are used, so a seed's shapes are bit-identical on every
-//! machine.
+//! Only sums, products, quotients, square roots and comparisons of 64-bit floats are used, so a seed's shapes are
+//! bit-identical on every machine.
 
 use crate::csg::{Kind, Primitive, Shape, cross_axes};
 use crate::error::CoreError;
@@ -12,8 +12,10 @@ use crate::voxel::{BitGrid, SIDE};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+mod bar;
 mod bore;
 mod sheet;
+pub use bar::BarConfig;
 pub use bore::BoreConfig;
 pub use sheet::SheetConfig;
 
@@ -43,6 +45,8 @@ pub struct GrammarConfig {
     pub bores: BoreConfig,
     /// Bent sheets to begin with; the paper has none.
     pub sheets: SheetConfig,
+    /// Hexagonal and octagonal bars to begin with; the paper has none.
+    pub bars: BarConfig,
     /// Share of subtracted primitives.
     pub subtracted: f64,
     /// Half sizes of the first primitive.
@@ -83,6 +87,7 @@ impl Default for GrammarConfig {
             regular: 0.0,
             bores: BoreConfig::default(),
             sheets: SheetConfig::default(),
+            bars: BarConfig::default(),
             subtracted: 0.33,
             first_half: [0.1, 0.4],
             half: [0.03, 0.25],
@@ -144,7 +149,7 @@ impl GrammarConfig {
             c if !(0.0..1.0).contains(&c.min_occupancy) => bad("min_occupancy must lie in [0, 1)"),
             c if c.min_extent >= SIDE => bad("min_extent must be less than 64"),
             c if c.attempts == 0 => bad("attempts must be at least 1"),
-            c => c.bores.check().and_then(|()| c.sheets.check()),
+            c => c.bores.check().and_then(|()| c.sheets.check()).and_then(|()| c.bars.check()),
         }
     }
 
@@ -167,6 +172,11 @@ impl GrammarConfig {
         let mut shape = Vec::new();
         if self.sheets.share > 0.0 && random.chance(self.sheets.share) {
             shape = self.sheets.draw(random);
+        } else if self.bars.share > 0.0 && random.chance(self.bars.share) {
+            shape = self.bars.draw(random);
+            if random.chance(self.bars.alone) {
+                return shape;
+            }
         } else {
             let first = self.primitive(self.first_half, true, random);
             push_symmetric(&mut shape, first);
@@ -311,6 +321,7 @@ mod tests {
             chamfered: 0.5,
             regular: 0.5,
             bores: BoreConfig { share: 0.3, ..BoreConfig::default() },
+            bars: BarConfig { share: 0.3, ..BarConfig::default() },
             ..paper.clone()
         };
         for (config, sample) in (0..200).flat_map(|i| [(&paper, i), (&wedges, i)]) {

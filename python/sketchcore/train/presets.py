@@ -110,6 +110,7 @@ COMPACT = Preset(
             "regular": 0.4,
             "bores": {"share": 0.15},
             "sheets": {"share": 0.1},
+            "bars": {"share": 0.1},
         },
         "free": {"share": 0.25, "elevation": [0.0, 60.0]},
         "hand": {"share": 0.7},
