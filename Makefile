@@ -52,11 +52,13 @@ test: test-rust test-python
 test-rust:
 	cargo test --quiet
 
-# The tests of the app draw in a real browser, and are skipped where there is none: this installs it where it may.
+# The tests of the app draw in a real browser, and are skipped where there is none: this installs it where it may. Each of
+# WORKERS processes takes whole files of tests, fast ones first; plain `pytest` runs all in one.
+WORKERS ?= 2
 test-python: $(BUILT)
 	@command -v chromium >/dev/null || [ "$$(id -u)" != 0 ] || { apt-get update -qq; \
 		DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends chromium; } >/dev/null || true
-	$(BIN)/pytest --quiet
+	$(BIN)/pytest --quiet --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 # A minute of each target, or FUZZ_SECONDS; what is found is kept in fuzz/findings. TARGETS="mesh http" takes some.
 FUZZ_SECONDS ?= 60
