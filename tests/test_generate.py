@@ -328,9 +328,12 @@ def test_bars_are_milled_bored_and_mostly_alone():
         axis = int(bore[0]) - 1
         axes.add(axis)
         u, v = (a for a in range(3) if a != axis)
-        assert bore[1] == 0 and 2 <= len(turned) <= 3 and set(turned[1:, 0]) == {19.0 + axis}
+        assert bore[1] == 0
+        assert 2 <= len(turned) <= 3
+        assert set(turned[1:, 0]) == {19.0 + axis}
         cuts = shape[(shape[:, 1] == 0) & (shape[:, 0] >= 4)]
-        assert len(cuts) == 4 and {int(kind) // 4 - 1 for kind in cuts[:, 0]} == {axis}
+        assert len(cuts) == 4
+        assert {int(kind) // 4 - 1 for kind in cuts[:, 0]} == {axis}
         # The hole takes half the way from face to face, and one sees through it.
         sides = shape[(shape[:, 1] == 0) & (shape[:, 0] == 0)]
         away = np.abs(sides[:, 2:5] - bore[2:5])

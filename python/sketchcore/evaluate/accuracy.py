@@ -97,7 +97,7 @@ def measure_accuracy(
         hulls = _hulls(example.drawings, list(example.cameras))
         started = time.perf_counter()
         for v in range(VIEWS):
-            volumes = predictions(model, example, v + 1, ROUNDS, align=align)
+            volumes = predictions(model, example.drawings[: v + 1], example.cameras[: v + 1], align=align)
             network[i, v] = [iou(volume, example.world) for volume in volumes]
             concavities[i, v] = _left_empty(volumes[-1], hulls[v], example.world)
         seconds += time.perf_counter() - started
@@ -122,24 +122,22 @@ def measure_accuracy(
     )
 
 
-def settled(model: Model, drawings: NDArray[np.uint8], cameras: Sequence[Camera]) -> Volume:
-    """The solid of drawings, uint8 [n, 256, 256], as `reconstruct` makes it: in their places, until it has settled."""
-    sketches = model.in_place(Sketches(drawings, pack_cameras(cameras)))
-    *_, volume = until_settled(model.rounds(sketches, ROUNDS), first=model.first(len(sketches)))
-    return volume
-
-
 def predictions(
-    model: Model, example: Example, views: int, rounds: int, tolerance: float = TOLERANCE, align: bool = True
-) -> list[NDArray[np.float32]]:
-    """The volumes of an example's first drawings: the first prediction, then each round's.
+    model: Model,
+    drawings: NDArray[np.uint8],
+    cameras: Sequence[Camera],
+    rounds: int = ROUNDS,
+    tolerance: float = TOLERANCE,
+    align: bool = True,
+) -> list[Volume]:
+    """The volumes of drawings, uint8 [n, 256, 256], as `reconstruct` makes them: the first prediction, then each round.
 
     Where rounds end early, because the solid has settled, their last volume stands for those that were saved.
     """
-    sketches = Sketches(example.drawings[:views], pack_cameras(example.cameras[:views]))
+    sketches = Sketches(drawings, pack_cameras(cameras))
     if align:
         sketches = model.in_place(sketches)
-    made = list(until_settled(model.rounds(sketches, rounds), tolerance, model.first(views)))
+    made = list(until_settled(model.rounds(sketches, rounds), tolerance, model.first(len(sketches))))
     return made + [made[-1]] * (rounds + 1 - len(made))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from sketchcore.advice import best_view
 from sketchcore.camera import VIEWPOINTS
-from sketchcore.evaluate.accuracy import settled
+from sketchcore.evaluate.accuracy import predictions
 from sketchcore.evaluate.figure import Figure
 from sketchcore.evaluate.report import Report
 from sketchcore.evaluate.testset import Example, count_shapes, load_testset
@@ -94,4 +94,4 @@ def measure_advice(
 def _reconstruct(model: Model, example: Example, names: Sequence[str]) -> Volume:
     cameras = [VIEWPOINTS[name] for name in names]
     drawings = np.stack([draw(example.shape, camera) for camera in cameras])
-    return settled(model, drawings, cameras)
+    return predictions(model, drawings, cameras)[-1]

@@ -61,7 +61,7 @@ def measure_convergence(
     orders = np.empty((total, VIEWS - 1))
     for i, example in enumerate(load_testset(shapes, progress)):
         for v in range(VIEWS):
-            volumes = predictions(model, example, v + 1, MANY_ROUNDS, tolerance=0)
+            volumes = predictions(model, example.drawings[: v + 1], example.cameras[: v + 1], MANY_ROUNDS, tolerance=0)
             network[i, v] = [iou(volume, example.world) for volume in volumes]
             change[i, v] = [float(np.linalg.norm(b - a)) for a, b in itertools.pairwise(volumes)]
             if v > 0:

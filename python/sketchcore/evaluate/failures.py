@@ -13,7 +13,7 @@ from PIL import Image
 
 from sketchcore.atomic import replacing
 from sketchcore.camera import VIEWPOINTS, Camera
-from sketchcore.evaluate.accuracy import ROUNDS, predictions
+from sketchcore.evaluate.accuracy import predictions
 from sketchcore.evaluate.report import Report
 from sketchcore.evaluate.testset import Example, count_shapes, load_testset
 from sketchcore.nets.model import Model
@@ -66,7 +66,7 @@ def measure_failures(
     total = count_shapes(shapes)
     found: list[tuple[float, int, NDArray[np.float32], Example]] = []
     for i, example in enumerate(load_testset(shapes, progress)):
-        volume = predictions(model, example, 1, ROUNDS)[-1]
+        volume = predictions(model, example.drawings[:1], example.cameras[:1])[-1]
         found.append((iou(volume, example.world), i, volume, example))
         found = sorted(found, key=lambda entry: entry[:2])[:SHOWN]
     if out is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sketchcore.evaluate.accuracy import VIEWS, settled
+from sketchcore.evaluate.accuracy import VIEWS, predictions
 from sketchcore.evaluate.distort import STRENGTHS, distorted
 from sketchcore.evaluate.figure import Figure
 from sketchcore.evaluate.report import Report
@@ -76,4 +76,4 @@ def _scores(model: Model, example: ShapeExample, faults: dict[str, int], seed: i
             for v, camera in enumerate(example.cameras)
         ]
     )
-    return [iou(settled(model, drawings[:n], example.cameras[:n]), example.world) for n in COUNTS]
+    return [iou(predictions(model, drawings[:n], example.cameras[:n])[-1], example.world) for n in COUNTS]
