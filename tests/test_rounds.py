@@ -120,6 +120,13 @@ def test_a_drawing_from_elsewhere_is_traced_to_its_camera(elevation: float) -> N
     assert found.position == pytest.approx(camera.position)
 
 
+def test_nobody_draws_one_face_alone() -> None:
+    for azimuth in (90.0, 180.0):
+        _, found = guess_camera(Oracle(), sk.draw(SHAPE, sk.Camera.orbit(azimuth, 4.0, fov_degrees=28)))
+        across = np.abs(found.position[[0, 2]])
+        assert across.min() > 0.2 * across.max()
+
+
 def test_what_crosses_is_counted_against_what_is_occupied() -> None:
     before = np.zeros((64, 64, 64), np.float32)
     before[:10, 0, 0] = 0.6

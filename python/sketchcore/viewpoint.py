@@ -33,6 +33,8 @@ _GAIN = 0.03
 _STEP = 15
 _ELEVATIONS = (4.0, 14.0, 22.0, 30.0, 38.0)
 _FIELDS_OF_VIEW = (28.0, 45.0)
+_FACE_ON = 90
+"""Nobody chooses to see one side alone, whose edges hide those behind: cameras at multiples of this are left out."""
 _TRIED = 40
 """Of these cameras, as many are tried as lines speak for most."""
 
@@ -52,7 +54,7 @@ def guess_camera(model: Model, drawing: NDArray[np.uint8]) -> tuple[str, Camera]
 
     Where the viewpoint leaves part of the outline empty, or lines run along other axes than it sees, cameras over half
     the circle are tried as well, from lower down and with a narrower field of view too: people draw from where they
-    like. The other half says the same of many objects.
+    like, but not face on. The other half says the same of many objects.
 
     Args:
         model: the network.
@@ -62,9 +64,10 @@ def guess_camera(model: Model, drawing: NDArray[np.uint8]) -> tuple[str, Camera]
     directions = Directions.of(drawing)
     position = VIEWPOINTS[name].position
     first = round(math.degrees(math.atan2(position[2], position[0])) / _STEP) * _STEP - 90
+    azimuths = [azimuth for azimuth in range(first, first + 180, _STEP) if azimuth % _FACE_ON]
     family = [
         Camera.orbit(azimuth, elevation, fov_degrees=fov)
-        for azimuth, elevation, fov in itertools.product(range(first, first + 180, _STEP), _ELEVATIONS, _FIELDS_OF_VIEW)
+        for azimuth, elevation, fov in itertools.product(azimuths, _ELEVATIONS, _FIELDS_OF_VIEW)
     ]
     agreed, agreements = directions.agreement(VIEWPOINTS[name]), [directions.agreement(one) for one in family]
     if fill >= _POOR and max(agreements) <= agreed + _CLEARER:
