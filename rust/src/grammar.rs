@@ -108,8 +108,6 @@ impl GrammarConfig {
     /// Says which entry no shape could be drawn with.
     pub fn check(&self) -> Result<(), CoreError> {
         let bad = |message: &str| Err(CoreError::Config(format!("grammar.{message}")));
-        let range = |[from, to]: [f64; 2]| from > 0.0 && from <= to && to.is_finite();
-        let share = |v: f64| (0.0..=1.0).contains(&v);
         let amplitude = |v: f64| v >= 0.0 && v.is_finite();
         match self {
             c if !(1..=c.steps[1]).contains(&c.steps[0]) => bad("steps must be [least, most], from 1"),
@@ -125,7 +123,7 @@ impl GrammarConfig {
                 c.displaced,
             ]
             .into_iter()
-            .all(share) =>
+            .all(is_share) =>
             {
                 bad(
                     "cylinders, wedges, slabs, chamfered, regular, fitted, subtracted and displaced are shares between \
@@ -133,13 +131,11 @@ impl GrammarConfig {
                 )
             }
             c if c.cylinders + c.wedges > 1.0 => bad("cylinders and wedges must be at most 1 together"),
-            c if !(range(c.first_half) && range(c.half)) => {
+            c if !(is_range(c.first_half) && is_range(c.half)) => {
                 bad("first_half and half must be [least, most], more than 0")
             }
-            c if !(range(c.slab_thickness) && c.slab_thickness[1] < 1.0) => {
-                bad("slab_thickness must be [least, most], between 0 and 1")
-            }
-            c if !(range(c.chamfer) && c.chamfer[1] <= 0.5) => {
+            c if !is_inner(c.slab_thickness) => bad("slab_thickness must be [least, most], between 0 and 1"),
+            c if !(is_range(c.chamfer) && c.chamfer[1] <= 0.5) => {
                 bad("chamfer must be [least, most], more than 0 and at most 0.5")
             }
             c if !(amplitude(c.displacement) && amplitude(c.overlap) && amplitude(c.sink)) => {
@@ -267,6 +263,21 @@ impl GrammarConfig {
         };
         new.center[axis] += sign * (on.half[axis] + outwards);
     }
+}
+
+/// Whether it is a share.
+fn is_share(share: f64) -> bool {
+    (0.0..=1.0).contains(&share)
+}
+
+/// Whether it is a range of sizes: from more than 0, its ends in order.
+fn is_range([from, to]: [f64; 2]) -> bool {
+    from > 0.0 && from <= to && to.is_finite()
+}
+
+/// Whether it is a range of sizes within something of size 1.
+fn is_inner(range: [f64; 2]) -> bool {
+    is_range(range) && range[1] < 1.0
 }
 
 /// How much of each side goes where four cut edges leave a hexagon, standing on an edge or on a corner, or an octagon.

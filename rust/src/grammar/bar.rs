@@ -1,6 +1,6 @@
 //! A bar of hexagonal or octagonal section, as regular as turned and milled parts are: a nut, a bolt's head, a pencil.
 
-use super::{BARS, edge_of};
+use super::{BARS, edge_of, is_inner, is_range, is_share};
 use crate::csg::{Frustum, Kind, Primitive, cross_axes};
 use crate::error::CoreError;
 use crate::random::Random;
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Serialize, Deserialize, PartialEq)]
 #[serde(default, deny_unknown_fields)]
 pub struct BarConfig {
-    /// Share of the shapes that begin with a bar; of sheets, if both are drawn, none.
+    /// Share of the shapes that begin with a bar, of those that begin with no sheet.
     pub share: f64,
     /// Share of these that nothing is added to.
     pub alone: f64,
@@ -50,16 +50,14 @@ impl BarConfig {
     /// Says which entry no bar could be drawn with.
     pub fn check(&self) -> Result<(), CoreError> {
         let bad = |message: &str| Err(CoreError::Config(format!("grammar.bars.{message}")));
-        let range = |[from, to]: [f64; 2]| from > 0.0 && from <= to && to.is_finite();
-        let within = |pair: [f64; 2]| range(pair) && pair[1] < 1.0;
         match self {
-            c if ![c.share, c.alone, c.bored, c.turned].iter().all(|s| (0.0..=1.0).contains(s)) => {
+            c if ![c.share, c.alone, c.bored, c.turned].into_iter().all(is_share) => {
                 bad("share, alone, bored and turned are shares between 0 and 1")
             }
-            c if !(range(c.radius) && range(c.half_length) && range(c.slope)) => {
+            c if !(is_range(c.radius) && is_range(c.half_length) && is_range(c.slope)) => {
                 bad("radius, half_length and slope must be [least, most], more than 0")
             }
-            c if !(within(c.bore) && within(c.end)) => {
+            c if !(is_inner(c.bore) && is_inner(c.end)) => {
                 bad("bore and end must be [least, most], between 0 and 1")
             }
             _ => Ok(()),
@@ -86,13 +84,14 @@ impl BarConfig {
         (around.half[u], around.half[v]) = (flats[0], flats[1]);
         for (a, flat, across) in [(u, flats[0], v), (v, flats[1], u)] {
             let beyond = 0.5 * (radius - flat);
+            if beyond <= 1e-9 * radius {
+                continue; // corners, and no faces, that way
+            }
             for sign in [1.0, -1.0] {
-                if beyond > 1e-9 * radius {
-                    let mut side = around;
-                    (side.half[a], side.half[across]) = (beyond, radius);
-                    side.center[a] = sign * (flat + beyond);
-                    bar.push(side);
-                }
+                let mut side = around;
+                (side.half[a], side.half[across]) = (beyond, radius);
+                side.center[a] = sign * (flat + beyond);
+                bar.push(side);
             }
         }
         let corners = [[1, 1], [1, -1], [-1, 1], [-1, -1]];

@@ -1,5 +1,6 @@
 //! A bore: a hole along an axis of a primitive, through it or into it, such as a nut's, a pipe's or a cup's.
 
+use super::{is_inner, is_share};
 use crate::csg::{Kind, Primitive, cross_axes};
 use crate::error::CoreError;
 use crate::random::Random;
@@ -31,12 +32,12 @@ impl BoreConfig {
     /// Says which entry nothing could be bored with.
     pub fn check(&self) -> Result<(), CoreError> {
         let bad = |message: &str| Err(CoreError::Config(format!("grammar.bores.{message}")));
-        let within = |[from, to]: [f64; 2]| 0.0 < from && from <= to && to < 1.0;
-        let share = |v: f64| (0.0..=1.0).contains(&v);
         match self {
-            c if !share(c.share) => bad("share must lie between 0 and 1"),
-            c if !(share(c.blind) && share(c.angular)) => bad("blind and angular are shares between 0 and 1"),
-            c if !(within(c.width) && within(c.depth)) => {
+            c if !is_share(c.share) => bad("share must lie between 0 and 1"),
+            c if !(is_share(c.blind) && is_share(c.angular)) => {
+                bad("blind and angular are shares between 0 and 1")
+            }
+            c if !(is_inner(c.width) && is_inner(c.depth)) => {
                 bad("width and depth must be [least, most], between 0 and 1")
             }
             _ => Ok(()),

@@ -1,6 +1,6 @@
 //! A bent sheet: panels in a chain, each at the end of the one before, such as a chair without legs or a flight of steps.
 
-use super::beyond_slab;
+use super::{beyond_slab, is_range, is_share};
 use crate::csg::{Kind, Primitive};
 use crate::error::CoreError;
 use crate::random::Random;
@@ -45,13 +45,12 @@ impl SheetConfig {
     /// Says which entry no sheet could be drawn with.
     pub fn check(&self) -> Result<(), CoreError> {
         let bad = |message: &str| Err(CoreError::Config(format!("grammar.sheets.{message}")));
-        let range = |[from, to]: [f64; 2]| from > 0.0 && from <= to && to.is_finite();
         match self {
-            c if !(0.0..=1.0).contains(&c.share) => bad("share must lie between 0 and 1"),
+            c if !is_share(c.share) => bad("share must lie between 0 and 1"),
             c if !(1..=c.panels[1]).contains(&c.panels[0]) || c.panels[1] > 50 => {
                 bad("panels must be [least, most], from 1 to 50")
             }
-            c if !(range(c.length) && range(c.thickness) && range(c.half_width)) => {
+            c if !(is_range(c.length) && is_range(c.thickness) && is_range(c.half_width)) => {
                 bad("length, thickness and half_width must be [least, most], more than 0")
             }
             c if c.thickness[1] > 0.6 * c.length[0] => bad("thickness must be at most 0.6 of length"),
