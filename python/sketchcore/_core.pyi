@@ -38,6 +38,7 @@ __all__ = [
     "random_style",
     "redraw",
     "silhouettes",
+    "straight",
     "style_camera",
     "to_camera_grid",
     "to_world_grid",
@@ -109,6 +110,7 @@ def style_camera(camera: NDArray[np.float64], style: str, seed: int) -> NDArray[
 def redraw(
     drawing: NDArray[np.uint8], style: str, seed: int, out: NDArray[np.uint8] | None = None
 ) -> NDArray[np.uint8]: ...
+def straight(drawing: NDArray[np.uint8], least: int) -> NDArray[np.float64]: ...
 def trace(drawing: NDArray[np.uint8], least: int, step: int, through: bool) -> list[NDArray[np.float32]]: ...
 def to_camera_grid(
     volumes: NDArray[np.float32], cameras: NDArray[np.float64], out: NDArray[np.float32] | None = None

@@ -1,9 +1,10 @@
 """Where a drawing was made from: one of the eight three-quarter viewpoints, or a camera somewhere else.
 
-A viewpoint is as plausible as the solid that is predicted from it fills the drawing's outline when seen from it: the
-prediction as it is, for once outlines are heeded every solid fills them. Cameras that stand elsewhere are compared by
-how sure the prediction is of itself as well (`nets/placement.py`), and by how much of the ink runs along the axes that
-they see (`directions.py`).
+A viewpoint is as plausible as the solid that is predicted from it fills the drawing's outline when seen from it (the
+prediction as it is, for once outlines are heeded every solid fills them), as the prediction is sure of itself, and as
+the drawing's straight lines run along the axes that it sees (`perspective.py`). Cameras that stand elsewhere are
+compared by the place and size of the solid as well (`nets/placement.py`), and by how much of the ink, straight or not,
+runs along their axes (`directions.py`).
 """
 
 from __future__ import annotations
@@ -18,10 +19,13 @@ from numpy.typing import NDArray
 from sketchcore.camera import QUARTER_VIEWS, VIEWPOINTS, Camera, pack_cameras
 from sketchcore.directions import Directions
 from sketchcore.nets.model import Model
-from sketchcore.nets.placement import NEAR, plausibility
+from sketchcore.nets.placement import CAMERA, expected_iou, plausibility
 from sketchcore.nets.sketches import Sketches
 from sketchcore.outline import outline_iou
+from sketchcore.perspective import Lines
 
+_CONFIDENCE, _LINES = 0.25, 0.01
+"""What a prediction's confidence counts for beside the outline that it fills, and lines' likelihood (its logarithm)."""
 _POOR = 0.86
 """A viewpoint from which less of the outline is filled may not be where the drawing was made from."""
 _CLEARER = 0.12
@@ -46,7 +50,7 @@ def guess_viewpoint(model: Model, drawing: NDArray[np.uint8]) -> list[str]:
         model: the network.
         drawing: uint8 [256, 256], ink 255 on 0.
     """
-    return [name for _, name in _ranked(model, drawing)]
+    return [name for name, _ in _ranked(model, drawing)]
 
 
 def guess_camera(model: Model, drawing: NDArray[np.uint8]) -> tuple[str, Camera]:
@@ -60,7 +64,7 @@ def guess_camera(model: Model, drawing: NDArray[np.uint8]) -> tuple[str, Camera]
         model: the network.
         drawing: uint8 [256, 256], ink 255 on 0.
     """
-    fill, name = _ranked(model, drawing)[0]
+    name, fill = _ranked(model, drawing)[0]
     directions = Directions.of(drawing)
     position = VIEWPOINTS[name].position
     first = round(math.degrees(math.atan2(position[2], position[0])) / _STEP) * _STEP - 90
@@ -77,7 +81,7 @@ def guess_camera(model: Model, drawing: NDArray[np.uint8]) -> tuple[str, Camera]
     agreed_by = [agreed, *(agreements[i] for i in tried)]
     sketches = _seen_by(drawing, cameras)
     scores = [
-        plausibility(volume, seen, NEAR) + _WEIGHT * share
+        plausibility(volume, seen, CAMERA) + _WEIGHT * share
         for volume, seen, share in zip(model.first_predictions(sketches), sketches, agreed_by, strict=True)
     ]
     best = max(range(len(cameras)), key=lambda i: scores[i])
@@ -96,11 +100,19 @@ def opposite(name: str) -> str:
     return QUARTER_VIEWS[(QUARTER_VIEWS.index(name) + len(QUARTER_VIEWS) // 2) % len(QUARTER_VIEWS)]
 
 
-def _ranked(model: Model, drawing: NDArray[np.uint8]) -> list[tuple[float, str]]:
+def _ranked(model: Model, drawing: NDArray[np.uint8]) -> list[tuple[str, float]]:
+    """The viewpoints, most plausible first, and how far from each the solid fills the outline."""
     cameras = [VIEWPOINTS[name] for name in QUARTER_VIEWS]
-    volumes = model.first_predictions(_seen_by(drawing, cameras))
+    volumes = list(model.first_predictions(_seen_by(drawing, cameras)))
     fills = [outline_iou(volume, camera, drawing) for volume, camera in zip(volumes, cameras, strict=True)]
-    return sorted(zip(fills, QUARTER_VIEWS, strict=True), key=lambda one: one[0], reverse=True)
+    nowhere = np.zeros((1, 5))
+    lines = [float(Lines.of(drawing, camera).likelihood(nowhere)[0]) for camera in cameras]
+    scores = [
+        fill + _CONFIDENCE * expected_iou(volume) + _LINES * likely
+        for fill, volume, likely in zip(fills, volumes, lines, strict=True)
+    ]
+    best_first = sorted(range(len(cameras)), key=lambda i: -scores[i])
+    return [(QUARTER_VIEWS[i], fills[i]) for i in best_first]
 
 
 def _seen_by(drawing: NDArray[np.uint8], cameras: Sequence[Camera]) -> list[Sketches]:

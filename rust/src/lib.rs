@@ -11,6 +11,7 @@
 //! batch: all of these for one sample, and samples side by side
 //!
 //! drawing -> distance -> carve, evidence                     what drawings say about space
+//! drawing -> trace -> straight                               what its lines say about the camera
 //! resample, lift                                             world grid <-> camera grid, <- image features
 //! convolution -> network                                     drawings -> what is probably there, world grid
 //! outlines                                                   what drawings ask of a volume
@@ -54,6 +55,7 @@ pub mod raster;
 pub mod raycast;
 pub mod resample;
 pub mod solid;
+pub mod straight;
 pub mod stroke;
 pub mod style;
 pub mod subject;

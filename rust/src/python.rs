@@ -57,7 +57,9 @@ mod _core {
     #[pymodule_export]
     use super::samples::{default_config, fit, generate};
     #[pymodule_export]
-    use super::strokes::{check_style, draw_kinds, hidden_lines, random_style, redraw, style_camera, trace};
+    use super::strokes::{
+        check_style, draw_kinds, hidden_lines, random_style, redraw, straight, style_camera, trace,
+    };
     #[pymodule_export]
     use super::views::{buffers, draw, frustum, isosurface, lines, viewpoints};
     #[pymodule_export]

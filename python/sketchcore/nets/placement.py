@@ -3,7 +3,7 @@
 Objects are centred in the world and fill it (the 120 % rule), and networks count on it; people draw smaller, larger,
 off centre, and from a little beside the viewpoint. A drawing is where it belongs when the solid that is predicted from
 it is centred and of the right size, fills the outline, and is predicted with confidence. The three together say so far
-more surely than any one of them.
+more surely than any one of them; what the drawing's own straight lines say (`perspective.py`) comes to that.
 """
 
 from __future__ import annotations
@@ -25,15 +25,11 @@ LARGEST = 1 / 1.2
 CELLS = 64
 """Outlines are compared at this many pixels a side."""
 
-FAR = (0.61, 0.36, 1.4, 2.2)
+PLACE = (0.42, 0.79, 0.83, 0.08)
 """What counts beside confidence: how well the outline is filled, the logarithm of the size, and the distance of the
-box's middle from the origin along x and y. Fitted to tell places that are far apart (docs/training.md)."""
-NEAR = (1.0, 0.0, 0.7, 1.05)
-"""The same to tell from which side a drawing was made, to within a few degrees."""
-_OFF = 0.035
-"""A solid that is off by less, in size or place, fits its box."""
-_PLAIN = 0.17
-"""Drawings that fall short by more (`shortfall`) are plainly out of place: a better place could gain so much."""
+box's middle from the origin along x and y. Fitted to choose among places that lines speak for (docs/training.md)."""
+CAMERA = (1.0, 0.0, 0.7, 1.05)
+"""The same to choose among cameras all around, without a look at lines."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +46,17 @@ class Placement:
     scale: float = 1.0
     shift: tuple[float, float] = (0.0, 0.0)
     turn: tuple[float, float] = (0.0, 0.0)
+
+    @classmethod
+    def from_numbers(cls, numbers: NDArray[np.float64]) -> Placement:
+        """The placement of five numbers, float64 [5] (see `numbers`)."""
+        scale, right, down, about_right, about_down = numbers.tolist()
+        return cls(math.exp(scale), (right, down), (about_right, about_down))
+
+    @property
+    def numbers(self) -> NDArray[np.float64]:
+        """float64 [5]: the logarithm of the scale, the shift, and the turn."""
+        return np.array([math.log(self.scale), *self.shift, *self.turn])
 
     def of(self, sketches: Sketches) -> Sketches:
         """One drawing, taken so."""
@@ -76,43 +83,32 @@ class Placement:
         return (np.asarray(moved, np.float32) * np.float32(max(inverse, 1.0))).clip(0, 255).astype(np.uint8)
 
 
-def out_of_place(volume: Volume, sketches: Sketches) -> bool:
-    """Whether drawings are plainly out of place: the solid is far off centre or off size, or leaves outlines empty."""
-    return shortfall(volume, sketches) > _PLAIN
-
-
-def box_is_off(volume: Volume) -> bool:
-    """Whether a solid is plainly off centre or off size, or empty."""
-    box = bounds(volume)
-    if box is None:
-        return True
-    middle, side = box
-    return max(abs(math.log(LARGEST / side)), float(np.abs(middle).max()) / LARGEST) > _OFF
-
-
-def plausibility(volume: Volume, sketches: Sketches, weights: tuple[float, float, float, float] = FAR) -> float:
+def plausibility(volume: Volume, sketches: Sketches, weights: tuple[float, float, float, float] = PLACE) -> float:
     """How much speaks for drawings being where they belong, given what was predicted from them; higher is better.
 
     Args:
         volume: float32 [64, 64, 64], the prediction.
         sketches: what it was made from.
-        weights: `FAR` or `NEAR`.
+        weights: `PLACE` or `CAMERA`.
     """
-    occupied = volume > 0.5
-    if not occupied.any():
+    if not (volume > 0.5).any():
         return -math.inf
-    # The IoU that is to be expected of the solid, if each voxel is right as often as it says.
-    expected = float(volume[occupied].sum() / (occupied.sum() + volume[~occupied].sum()))
-    return expected + weights[0] - shortfall(volume, sketches, weights)
+    return expected_iou(volume) + weights[0] - shortfall(volume, sketches, weights)
 
 
-def shortfall(volume: Volume, sketches: Sketches, weights: tuple[float, float, float, float] = FAR) -> float:
+def expected_iou(volume: Volume) -> float:
+    """The IoU that is to be expected of a solid, if each voxel is right as often as it says; 0 for an empty one."""
+    occupied = volume > 0.5
+    return float(volume[occupied].sum() / max(occupied.sum() + volume[~occupied].sum(), 1e-9))
+
+
+def shortfall(volume: Volume, sketches: Sketches, weights: tuple[float, float, float, float] = PLACE) -> float:
     """By how much a prediction misses the size and the place that objects have, and its drawings' outlines; 0 is best.
 
     Args:
         volume: float32 [64, 64, 64], the prediction.
         sketches: what it was made from.
-        weights: `FAR` or `NEAR`.
+        weights: `PLACE` or `CAMERA`.
     """
     box = bounds(volume)
     if box is None:

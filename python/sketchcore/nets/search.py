@@ -1,54 +1,79 @@
-"""The search for where drawings belong (`placement.py`): places that predictions point to, then many about the best."""
+"""The search for where drawings belong: places that the drawing's lines speak for, judged by what is predicted there.
+
+Lines (`perspective.py`) say to a fraction of a degree from which side a drawing was made, if nothing else is wrong with
+it, and nearly as well where it belongs and how large, if it is only that; which of these it is, predictions tell
+(`placement.py`). So the likeliest place is looked for along each of the ways in which a drawing may be out of place,
+then around the most plausible of these.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sketchcore import _core
 from sketchcore.camera import Camera
-from sketchcore.nets.placement import (
-    CELLS,
-    LARGEST,
-    NEAR,
-    Placement,
-    bounds,
-    box_is_off,
-    out_of_place,
-    plausibility,
-    seen_at,
-)
+from sketchcore.nets.placement import LARGEST, Placement, bounds, plausibility, seen_at, shortfall
 from sketchcore.nets.sketches import Sketches
+from sketchcore.perspective import Lines, stray
 from sketchcore.rounds import Volume
 
 Predict = Callable[[Sequence[Sketches]], Iterator[Volume]]
 """A network's first predictions, one for the drawings of each object."""
 
-_GAIN = 0.03
-"""How much more plausible another place must be than the one where the drawing is, for one that is looked for."""
-_PLAIN_GAIN = 0.14
-"""The same where nobody asked: exact drawings of odd shapes may look out of place, but gain less (docs/training.md)."""
-_DOUBT = 0.03
-"""The likelihood of a place grows by e for so much more of its score."""
-_STEPS = 3
-_OVERSHOOT = 1.2
-"""Solids are predicted nearer to where they belong than drawings are: a step goes further than they say."""
-_FAR_SPREADS = (np.array([0.06, 6.0, 6.0, 0.0, 0.0]), np.array([0.04, 4.0, 4.0, 0.0, 0.0]))
-"""Logarithm of the scale, pixels right and down, degrees about right and down over which places are drawn, round after
-round, about the likeliest."""
-_RINGS = (10.0, 5.0)
-"""Degrees by which the camera is turned to each of eight sides, then to each about the likeliest of them."""
-_NEAR_SPREAD = np.array([0.03, 3.0, 3.0, 4.0, 4.0])
-"""The same, about the likeliest place after that."""
-_DRAWS = 12
-_NEAR_BY = np.array([0.04, 4.0, 4.0, 7.0, 7.0])
-_STRAY = 0.01
-"""What it costs in plausibility to go so far from where the search began, and four times that for twice as far."""
+_AMISS, _PART = 5.0, 0.5
+"""A drawing is looked for that is so much likelier elsewhere (the logarithm): by its lines, and by this part of what
+the box and the outline of what is predicted could gain. Of exact drawings, that is one in seven."""
+_HOPELESS = 3.0
+"""A search ends where all that lines speak for is so much less likely than where the drawing is."""
+_DOUBT = 0.0125
+"""The likelihood of a place grows by e for so much more plausibility."""
+_LINES = 0.75
+"""What the likelihood of lines counts for: they say some things twice."""
+_FAULT = 2.5
+"""The logarithm of how much rarer drawings are with one fault more."""
+_SPREADS = np.array([0.08, 7.0, 7.0, 5.0, 5.0])
+"""How far from the likeliest place others are tried: the logarithm of the scale, pixels right and down, degrees."""
+_SURE = 1 / 9
+"""Lines say where a drawing belongs three times less surely than they would if each were right."""
+_DRAWS = 8
+_USUAL = 138
+"""Pixels of the larger side of the ink in most drawings."""
+
+
+@dataclass(frozen=True)
+class _Way:
+    """A way in which a drawing may be out of place: which of the five numbers are off, and how many faults that is."""
+
+    free: tuple[bool, bool, bool, bool, bool]
+    faults: int
+
+    @property
+    def index(self) -> NDArray[np.intp]:
+        return np.flatnonzero(self.free)
+
+
+_Place = tuple[_Way, NDArray[np.float64]]
+_NONE = _Way((False, False, False, False, False), 0)
+_TURNED = _Way((False, False, False, True, True), 1)
+_SHIFTED = _Way((False, True, True, False, False), 1)
+_SCALED = _Way((True, False, False, False, False), 1)
+_PLACED = _Way((True, True, True, False, False), 2)
+_ALL = _Way((True, True, True, True, True), 3)
+_SINGLE = (_TURNED, _SHIFTED, _SCALED)
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """A place, in what way it differs from where the drawing is, what is predicted there, and how likely it is."""
+
+    way: _Way
+    numbers: NDArray[np.float64]
+    volume: Volume
+    likelihood: float
 
 
 def in_place(predict: Predict, sketches: Sketches, first: Volume, always: bool = False) -> Sketches:
@@ -65,14 +90,17 @@ def in_place(predict: Predict, sketches: Sketches, first: Volume, always: bool =
     Returns:
         the drawings; the very same object if none is moved.
     """
-    if not always and not out_of_place(first, sketches):
-        return sketches
     alone = [Sketches(sketches.drawings[i : i + 1], sketches.cameras[i : i + 1]) for i in range(len(sketches))]
-    firsts = [first] if len(alone) == 1 else predict(alone)
-    gain = _GAIN if always else _PLAIN_GAIN
+    lines = [Lines.of(one.drawings[0], Camera.from_packed(one.cameras[0])) for one in alone]
+    elsewhere = [_run_elsewhere(one) for one in lines]
+    amiss = [always or _amiss(gained, first, one) > 0 for gained, one in zip(elsewhere, alone, strict=True)]
+    if not any(amiss):
+        return sketches
+    looked_for = [one for one, off in zip(alone, amiss, strict=True) if off]
+    firsts = iter([first] if len(alone) == 1 else list(predict(looked_for)))
     found = [
-        _search(predict, one, volume, gain) if always or out_of_place(volume, one) else Placement()
-        for one, volume in zip(alone, firsts, strict=True)
+        _Search(predict, one, run, next(firsts)).place() if off else Placement()
+        for one, run, off in zip(alone, lines, amiss, strict=True)
     ]
     if all(place == Placement() for place in found):
         return sketches
@@ -80,147 +108,132 @@ def in_place(predict: Predict, sketches: Sketches, first: Volume, always: bool =
     moved = Sketches(np.concatenate([s.drawings for s in taken]), np.concatenate([s.cameras for s in taken]))
     if len(alone) > 1:
         [together] = predict([moved])
-        if plausibility(together, moved) < plausibility(first, sketches) + gain:
+        said = sum(_said(one, place.numbers) - _said(one, np.zeros(5)) for one, place in zip(lines, found, strict=True))
+        if not (plausibility(together, moved) - plausibility(first, sketches)) / _DOUBT + said > 0:
             return sketches
     return moved
 
 
-@dataclass(frozen=True)
-class _Tried:
-    """A place, the drawing there, and what is predicted from it."""
-
-    place: Placement
-    sketches: Sketches
-    volume: Volume
-
-    @cached_property
-    def plausibility(self) -> float:
-        return plausibility(self.volume, self.sketches)
-
-    @cached_property
-    def finely(self) -> float:
-        """The plausibility by weights that tell neighbouring places apart."""
-        return plausibility(self.volume, self.sketches, NEAR)
+def _amiss(elsewhere: float, volume: Volume, sketches: Sketches) -> float:
+    """By how much drawings are too far out of place to be left where they are."""
+    return elsewhere + _PART * shortfall(volume, sketches) / _DOUBT - _AMISS
 
 
-def _search(predict: Predict, sketches: Sketches, first: Volume, gain: float) -> Placement:
-    """Where one drawing belongs; where it is, unless another place is more plausible by so much."""
-
-    def attempt(places: Sequence[Placement]) -> list[_Tried]:
-        taken = [place.of(sketches) for place in places]
-        return [_Tried(*one) for one in zip(places, taken, predict(taken), strict=True)]
-
-    here = _Tried(Placement(), sketches, first)
-    begun = _far(attempt, here, gain) if box_is_off(first) else here
-    return _refined(attempt, begun, gain if begun is here else _GAIN).place
+def _said(lines: Lines, numbers: NDArray[np.float64]) -> float:
+    """What lines say of a place, and how rare drawings are that are so far from where they belong."""
+    return _LINES * float(lines.likelihood(numbers[None])[0] - stray(numbers))
 
 
-Attempt = Callable[[Sequence[Placement]], list[_Tried]]
+def _run_elsewhere(lines: Lines) -> float:
+    """How much likelier the lines are if the drawing has one fault than if it has none, the logarithm."""
+    if not len(lines):
+        return 0.0
+    here = float(lines.likelihood(np.zeros((1, 5)))[0])
+    _, reached = lines.fit(np.zeros((len(_SINGLE), 5)), np.array([way.free for way in _SINGLE]))
+    return float(reached.max()) - here
 
 
-def _far(attempt: Attempt, here: _Tried, gain: float) -> _Tried:
-    """The place that solids' boxes point to, from where the drawing is and from where it would fit roughly."""
-    camera = Camera.from_packed(here.sketches.cameras[0])
-    tried = [here, *attempt([_roughly(here.sketches, camera)])]
-    front = list(tried)
-    for _ in range(_STEPS):
-        steps = [step for one in front for step in _suggested(one, camera)]
-        if not steps:
-            break
-        fresh = attempt(steps)
-        tried += fresh
-        front = sorted(fresh, key=lambda one: -one.plausibility)[:2]
-        if front[0].plausibility < here.plausibility:  # what looked amiss is not mended by moving it
-            break
-    best = max(tried, key=lambda one: one.plausibility)
-    if best is here:
-        return here
-    # Single predictions judge their places with errors; the mean over many about the best is surer.
-    weighed, mean = [best], best.place
-    for spread in _FAR_SPREADS:
-        weighed += attempt(_around(mean, spread))
-        mean = _mean([one.place for one in weighed], [one.plausibility for one in weighed])
-    [best] = attempt([mean])
-    return best if best.plausibility > here.plausibility + gain else here
+class _Search:
+    """Where one drawing belongs; where it is, unless another place is likelier by so much."""
+
+    def __init__(self, predict: Predict, sketches: Sketches, lines: Lines, first: Volume) -> None:
+        self.predict, self.sketches, self.lines = predict, sketches, lines
+        self.camera = Camera.from_packed(sketches.cameras[0])
+        self.tried = [self._tried(_NONE, np.zeros(5), sketches, first)]
+
+    def place(self) -> Placement:
+        here = self.tried[0]
+        singles, others = self._spoken_for()
+        self._attempt([*singles, *self._suggested(here)])
+        if self._second() < here.likelihood - _HOPELESS:
+            return Placement()
+        self._attempt(others)
+        self._attempt(self._suggested(self._best()))
+        ways = sorted({one.way for one in self.tried[1:]}, key=lambda way: -self._best(way).likelihood)
+        for way in dict.fromkeys((*ways[:2], _SHIFTED)):
+            self._attempt(self._around(way, self._best(way).numbers, 1.0))
+        best = self._best()
+        if best.way is _NONE:
+            return Placement()
+        self._attempt(self._around(best.way, self._mean(best.way), 0.5))
+        self._attempt([(best.way, self._mean(best.way))])
+        # Single predictions judge their places with errors; the mean of many is surer.
+        mean, best = self.tried[-1], self._best()
+        taken = mean if mean.likelihood > best.likelihood - 1 else best
+        return Placement.from_numbers(taken.numbers) if taken.likelihood > here.likelihood else Placement()
+
+    def _tried(self, way: _Way, numbers: NDArray[np.float64], sketches: Sketches, volume: Volume) -> _Tried:
+        plausible = plausibility(volume, sketches) / _DOUBT
+        return _Tried(way, numbers, volume, plausible + _said(self.lines, numbers) - _FAULT * way.faults)
+
+    def _attempt(self, places: Sequence[_Place]) -> None:
+        taken = [Placement.from_numbers(numbers).of(self.sketches) for _, numbers in places]
+        for (way, numbers), sketches, volume in zip(places, taken, self.predict(taken), strict=True):
+            self.tried.append(self._tried(way, numbers, sketches, volume))
+
+    def _best(self, way: _Way | None = None) -> _Tried:
+        return max((one for one in self.tried if way in (None, one.way)), key=_likelihood)
+
+    def _second(self) -> float:
+        return max((one.likelihood for one in self.tried[1:]), default=-math.inf)
+
+    def _spoken_for(self) -> tuple[list[_Place], list[_Place]]:
+        """The places that lines speak for: if only one thing is wrong with the drawing, and otherwise.
+
+        Lines are asked from where the drawing is, and from where it would fit roughly.
+        """
+        roughly = self._roughly()
+        shifted = np.array([0.0, *(roughly[1:3] / math.exp(roughly[0])), 0.0, 0.0])
+        places = [(_NONE, np.zeros(5)), (_SHIFTED, shifted)]
+        if not len(self.lines):
+            return places[1:], [(_PLACED, roughly)]
+        begun = [(way, np.zeros(5)) for way in (*_SINGLE, _PLACED, _ALL)]
+        begun += [(_SHIFTED, shifted), (_PLACED, roughly), (_ALL, roughly)]
+        fits, _ = self.lines.fit(np.array([start for _, start in begun]), np.array([way.free for way, _ in begun]))
+        for (way, _), numbers in zip(begun, fits, strict=True):
+            if all(np.abs((numbers - known) / _SPREADS).max() > 0.05 for _, known in places):
+                places.append((way, numbers))
+        singles = [place for place in places[2:] if place[0] in _SINGLE]
+        return singles, [place for place in places[1:] if all(place is not one for one in singles)]
+
+    def _roughly(self) -> NDArray[np.float64]:
+        """The ink in the middle, as large as drawings usually are."""
+        rows, columns = np.nonzero(self.sketches.drawings[0] >= 64)
+        if not len(rows):
+            return np.zeros(5)
+        low, high = np.array([columns.min(), rows.min()]), np.array([columns.max(), rows.max()]) + 1
+        scale = _USUAL / float((high - low).max())
+        shift = scale * (seen_at(self.camera, np.zeros(3)) - 0.5 * (low + high))
+        return np.array([math.log(scale), *shift, 0.0, 0.0])
+
+    def _suggested(self, one: _Tried) -> list[_Place]:
+        """The place at which the box of what is predicted would be where it belongs."""
+        box = bounds(one.volume)
+        if box is None:
+            return []
+        middle, side = box
+        scale = min(max(LARGEST / side, 0.5), 2.0)
+        shift = scale * (one.numbers[1:3] + seen_at(self.camera, np.zeros(3)) - seen_at(self.camera, middle))
+        return [(_PLACED, np.array([one.numbers[0] + math.log(scale), *shift, 0.0, 0.0]))]
+
+    def _around(self, way: _Way, at: NDArray[np.float64], far: float) -> list[_Place]:
+        """Places about another one as far as lines allow, always the same, in pairs on opposite sides of it."""
+        index = way.index
+        told = _SURE * self.lines.information(at) if len(self.lines) else np.zeros((5, 5))
+        told = told[np.ix_(index, index)] + np.diag(_SPREADS[index] ** -2)
+        spread = far * np.linalg.cholesky(np.linalg.inv(told))
+        sides = np.random.default_rng(0).standard_normal((_DRAWS // 2, len(index)))
+        sides *= math.sqrt(len(index)) / np.linalg.norm(sides, axis=1, keepdims=True)
+        places = np.repeat(at[None], _DRAWS, axis=0)
+        places[:, index] += np.concatenate([sides, -sides]) @ spread.T
+        return [(way, place) for place in places]
+
+    def _mean(self, way: _Way) -> NDArray[np.float64]:
+        """The mean of places, weighted by their likelihoods."""
+        tried = [one for one in self.tried if one.way is way]
+        weights = np.exp(np.array([one.likelihood for one in tried]) - self._best(way).likelihood)
+        return np.asarray(weights / weights.sum() @ np.stack([one.numbers for one in tried]))
 
 
-def _refined(attempt: Attempt, begun: _Tried, gain: float) -> _Tried:
-    """From which side it was drawn, and the last pixels."""
-    if begun.plausibility == -math.inf:  # nothing is predicted that could be judged
-        return begun
-
-    def score(one: _Tried) -> float:
-        stray = (_numbers(one.place) - _numbers(begun.place)) / _NEAR_BY
-        return one.finely - _STRAY * float(stray @ stray)
-
-    tried, best = [begun], begun
-    for degrees in _RINGS:
-        sides = [math.tau * side / 8 for side in range(8)]
-        turns = [np.array([0, 0, 0, degrees * math.cos(side), degrees * math.sin(side)]) for side in sides]
-        tried += attempt([_changed(best.place, turn) for turn in turns])
-        best = max(tried, key=score)
-    tried += attempt(_around(best.place, _NEAR_SPREAD))
-    tried += attempt([_mean([one.place for one in tried], [score(one) for one in tried])])
-    best = max(tried, key=score)
-    return best if score(best) > score(begun) + gain else begun
-
-
-def _roughly(sketches: Sketches, camera: Camera) -> Placement:
-    """The ink in the middle, as large as drawings usually are."""
-    rows, columns = np.nonzero(sketches.drawings[0] >= 64)
-    if not len(rows):
-        return Placement()
-    low, high = np.array([columns.min(), rows.min()]), np.array([columns.max(), rows.max()]) + 1
-    scale = 138 / float((high - low).max())
-    shift = scale * (seen_at(camera, np.zeros(3)) - 0.5 * (low + high))
-    return Placement(scale, (float(shift[0]), float(shift[1])))
-
-
-def _suggested(one: _Tried, camera: Camera) -> list[Placement]:
-    """Places that a prediction points to: its box where it belongs, and its outline on the drawing's as well."""
-    box = bounds(one.volume)
-    if box is None:
-        return []
-    middle, side = box
-    factor = min(max(LARGEST / side, 0.5), 2.0) ** _OVERSHOOT
-    origin = seen_at(camera, np.zeros(3))
-    shift = factor * (np.array(one.place.shift) + origin - seen_at(camera, _OVERSHOOT * middle))
-    places = [Placement(one.place.scale * factor, (float(shift[0]), float(shift[1])))]
-    seen = np.isfinite(_core.isosurface(one.volume, 0.5, camera.packed, CELLS)[0])
-    drawn = one.sketches.depths[0] > 0
-    if seen.any() and drawn.any():
-        further = shift + 0.9 * factor * (256 / CELLS) * (_middle(seen) - _middle(drawn))
-        places.append(Placement(places[0].scale, (float(further[0]), float(further[1]))))
-    return places
-
-
-def _middle(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """The middle of a mask's box: columns, rows."""
-    rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
-    return 0.5 * np.array([columns[0] + columns[-1], rows[0] + rows[-1]], np.float64)
-
-
-def _numbers(place: Placement) -> NDArray[np.float64]:
-    """A place as float64 [5]: logarithm of the scale, shift, turn."""
-    return np.array([math.log(place.scale), *place.shift, *place.turn])
-
-
-def _place(numbers: NDArray[np.float64]) -> Placement:
-    scale, right, down, about_right, about_down = numbers.tolist()
-    return Placement(math.exp(scale), (right, down), (about_right, about_down))
-
-
-def _around(place: Placement, spread: NDArray[np.float64]) -> list[Placement]:
-    """Places about another one, always the same, in pairs on opposite sides of it."""
-    changes = np.random.default_rng(0).standard_normal((_DRAWS // 2, 5)) * spread
-    return [_changed(place, change) for change in (*changes, *-changes)]
-
-
-def _changed(place: Placement, change: NDArray[np.float64]) -> Placement:
-    return _place(_numbers(place) + change)
-
-
-def _mean(places: Sequence[Placement], scores: Sequence[float]) -> Placement:
-    """The mean of places, weighted by their likelihoods."""
-    weights = np.exp((np.array(scores) - max(scores)) / _DOUBT)
-    return _place(weights / weights.sum() @ np.stack([_numbers(place) for place in places]))
+def _likelihood(one: _Tried) -> float:
+    return one.likelihood

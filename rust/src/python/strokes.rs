@@ -83,6 +83,24 @@ pub fn trace<'py>(
         .collect()
 }
 
+/// The straight pieces of a drawing's lines, float64 [n, 5]: both ends (x, y), a pixel's centre half a pixel from its
+/// edges, and by how much it bends.
+#[pyfunction]
+pub fn straight<'py>(
+    py: Python<'py>,
+    drawing: PyReadonlyArrayDyn<'py, u8>,
+    least: u8,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let drawing = checked(&drawing, "drawing", &[IMAGE as isize; 2])?;
+    let pieces = py.detach(|| crate::straight::straight(drawing, least));
+    let count = pieces.len();
+    let rows: Vec<f64> = pieces
+        .iter()
+        .flat_map(|p| [p.ends[0][0], p.ends[0][1], p.ends[1][0], p.ends[1][1], p.bend])
+        .collect();
+    rows.into_pyarray(py).reshape([count, 5])
+}
+
 /// The pixels of lines behind the first surface, uint8 [256, 256].
 #[pyfunction]
 pub fn hidden_lines<'py>(
