@@ -41,7 +41,7 @@ _STRAY, _STRAY_IF_SHORT, _SHORT = 0.25, 0.6, 16.0
 """The share of lines that run along no axis, and that of those shorter than so many pixels."""
 _STEPS = 6
 _SMALL = np.array([1e-3, 0.1, 0.1, 0.05, 0.05])
-"""Changes that derivatives are taken by; a fit ends when it moves by less than a third of it."""
+"""Changes that derivatives are taken by; a fit ends when it moves by less."""
 _FURTHEST = np.array([0.15, 12.0, 12.0, 6.0, 6.0])
 """The longest step of a fit."""
 
@@ -90,7 +90,7 @@ class Lines:
         at = numbers[None]
         off = self._off(at)
         noise = max(NOISE, key=lambda one: float(self._likelihood(off, one)[0]))
-        return np.asarray(self._normal(at, off, noise)[0][0])
+        return np.asarray(self._normal(at, np.ones((1, 5), np.bool_), noise)[0][0])
 
     def fit(self, starts: Numbers, free: NDArray[np.bool_]) -> tuple[Numbers, NDArray[np.float64]]:
         """The likeliest ways to take the drawing.
@@ -107,14 +107,14 @@ class Lines:
         held = ~free[:, :, None] | ~free[:, None, :]
         for noise in (_COARSE, *NOISE):
             for _ in range(_STEPS):
-                curvature, slope = self._normal(at, self._off(at), noise)
+                curvature, slope = self._normal(at, free, noise)
                 curvature = curvature + np.diag(SPREADS**-2)
                 slope = np.where(free, slope + at * SPREADS**-2, 0.0)
                 curvature = np.where(held, np.eye(5), curvature)
                 step = -np.linalg.solve(curvature, slope[..., None])[..., 0]
                 step /= np.maximum(1.0, np.max(np.abs(step) / _FURTHEST, axis=1, keepdims=True))
                 at = at + step
-                if np.max(np.abs(step) / _SMALL) < 0.3:
+                if np.max(np.abs(step) / _SMALL) < 1:
                     break
             if noise in NOISE:
                 likely = self._likelihood(self._off(at), noise) - stray(at)
@@ -160,18 +160,23 @@ class Lines:
         return np.asarray(np.log(strays * (1 + density.sum(axis=2))).sum(axis=1))
 
     def _normal(
-        self, numbers: Numbers, off: NDArray[np.float64], noise: float
+        self, numbers: Numbers, free: NDArray[np.bool_], noise: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Curvature [m, 5, 5] and slope [m, 5] of half the squared errors, each line's three axes weighed.
 
-        After Gauss and Newton: errors are taken to change in proportion to the numbers.
+        After Gauss and Newton: errors are taken to change in proportion to the numbers; those not free have none.
         """
+        which, number = np.nonzero(free)
+        changes = np.zeros((len(which), 5))
+        changes[np.arange(len(which)), number] = _SMALL[number]
+        all_off = self._off(np.concatenate([numbers, numbers[which] + changes]))
+        off, changed = all_off[: len(numbers)], all_off[len(numbers) :]
         densities = self._densities(off, noise)
         total = 1 + sum((values for values, _ in densities), np.zeros(())).sum(axis=2, keepdims=True)
         weights = sum((values / deviation**2 for values, deviation in densities), np.zeros(())) / total
-        changed = self._off((numbers[:, None] + np.diag(_SMALL)).reshape(-1, 5)).reshape(len(numbers), 5, -1, 3)
-        slopes = (changed - off[:, None] + math.pi / 2) % math.pi - math.pi / 2
-        slopes = (slopes / _SMALL[:, None, None]).reshape(len(numbers), 5, -1)
+        slopes = np.zeros((len(numbers), 5, off[0].size))
+        differences = (changed - off[which] + math.pi / 2) % math.pi - math.pi / 2
+        slopes[which, number] = (differences / _SMALL[number, None, None]).reshape(len(which), -1)
         weighted = slopes * weights.reshape(len(numbers), 1, -1)
         return weighted @ slopes.transpose(0, 2, 1), (weighted @ off.reshape(len(numbers), -1, 1))[..., 0]
 
