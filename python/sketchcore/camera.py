@@ -143,6 +143,17 @@ class Camera:
         turn = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
         return Camera(turn @ self.position, self.rotation @ turn.T, self.fov_degrees, self.near, self.far)
 
+    def widened(self, factor: float) -> Camera:
+        """The camera with a field of view so many times as large, from where a ball around the origin looks as large.
+
+        Its near and far planes keep their distance from the origin.
+        """
+        fov = self.fov_degrees * factor
+        away = _half_sine(self.fov_degrees) / _half_sine(fov)
+        gone = (away - 1) * float(np.linalg.norm(self.position))
+        near = max(self.near + gone, self.near / 20)
+        return Camera(away * self.position, self.rotation, fov, near, max(self.far + gone, 2 * near))
+
 
 def pack_cameras(cameras: Iterable[Camera]) -> NDArray[np.float64]:
     """float64 [n, 15], the form the Rust core takes.

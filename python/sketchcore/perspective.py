@@ -6,9 +6,9 @@ shifted. So lines alone tell to a fraction of a degree from which side a drawing
 and to a pixel or two where it belongs, if the side is known. They do not tell well which of both is wrong: that takes
 what is predicted from them (`nets/search.py`).
 
-How a drawing is taken is five numbers here, float64 [5], or [n, 5] for several ways: the logarithm of the scale about
-the point where the camera sees the world's origin, pixels to the right and down, and degrees by which the camera is
-turned about its own right and down axes (`nets/placement.py`).
+How a drawing is taken is six numbers here, float64 [6], or [n, 6] for several ways: the logarithm of the scale about
+the point where the camera sees the world's origin, pixels to the right and down, degrees by which the camera is turned
+about its own right and down axes, and the logarithm of how much wider its field of view is (`nets/placement.py`).
 """
 
 from __future__ import annotations
@@ -25,12 +25,11 @@ from sketchcore.drawing import INK
 
 Numbers = NDArray[np.float64]
 
-SPREADS = np.array([0.35, 30.0, 30.0, 10.0, 10.0])
+SPREADS = np.array([0.35, 30.0, 30.0, 10.0, 10.0, 0.15])
 """How far out of place drawings are: the standard deviation of each number."""
-NOISE = (1.6, 0.6, 0.25, 0.1)
-"""Pixels by which the ends of a line may miss it, from a hand to a renderer: the likeliest is a drawing's own."""
-_COARSE = 4.0
-"""A fit begins with this much, so that it sees lines that are far off."""
+NOISE = (4.0, 1.6, 0.6, 0.25, 0.1)
+"""Pixels by which the ends of a line may miss it, from a hand to a renderer: the likeliest is a drawing's own. A fit
+begins with the most, so that it sees lines that are far off."""
 _ALLOWED = 1.3
 """Standard deviation of a line's direction, as that of its ends by its length."""
 _STRAIGHT = 0.15
@@ -40,9 +39,9 @@ _LOOSE, _WIDER = 0.3, 4.0
 _STRAY, _STRAY_IF_SHORT, _SHORT = 0.25, 0.6, 16.0
 """The share of lines that run along no axis, and that of those shorter than so many pixels."""
 _STEPS = 6
-_SMALL = np.array([1e-3, 0.1, 0.1, 0.05, 0.05])
+_SMALL = np.array([1e-3, 0.1, 0.1, 0.05, 0.05, 1e-3])
 """Changes that derivatives are taken by; a fit ends when it moves by less."""
-_FURTHEST = np.array([0.15, 12.0, 12.0, 6.0, 6.0])
+_FURTHEST = np.array([0.15, 12.0, 12.0, 6.0, 6.0, 0.15])
 """The longest step of a fit."""
 
 
@@ -73,7 +72,7 @@ class Lines:
         """How much likelier the lines are if the drawing is taken so, than if they ran anywhere.
 
         Args:
-            numbers: float64 [m, 5], ways to take it.
+            numbers: float64 [m, 6], ways to take it.
 
         Returns:
             float64 [m], natural logarithms of the ratio of likelihoods, each for the likeliest noise; 0 without lines.
@@ -82,44 +81,43 @@ class Lines:
         return np.asarray(np.max([self._likelihood(off, noise) for noise in NOISE], axis=0))
 
     def information(self, numbers: Numbers) -> NDArray[np.float64]:
-        """How sharply lines tell of the numbers near one way to take the drawing: float64 [5, 5], inverse covariance.
+        """How sharply lines tell of the numbers near one way to take the drawing: float64 [6, 6], inverse covariance.
 
         Args:
-            numbers: float64 [5].
+            numbers: float64 [6].
         """
         at = numbers[None]
         off = self._off(at)
         noise = max(NOISE, key=lambda one: float(self._likelihood(off, one)[0]))
-        return np.asarray(self._normal(at, np.ones((1, 5), np.bool_), noise)[0][0])
+        return np.asarray(self._normal(at, np.ones((1, 6), np.bool_), noise)[0][0])
 
     def fit(self, starts: Numbers, free: NDArray[np.bool_]) -> tuple[Numbers, NDArray[np.float64]]:
         """The likeliest ways to take the drawing.
 
         Args:
-            starts: float64 [m, 5], where to begin.
-            free: bool [m, 5], which numbers may change from there.
+            starts: float64 [m, 6], where to begin.
+            free: bool [m, 6], which numbers may change from there.
 
         Returns:
-            float64 [m, 5], the numbers, and float64 [m], their `likelihood` less `stray`.
+            float64 [m, 6], the numbers, and float64 [m], their `likelihood` less `stray`.
         """
         at = starts.astype(np.float64)
         best, reached = at.copy(), np.full(len(at), -np.inf)
         held = ~free[:, :, None] | ~free[:, None, :]
-        for noise in (_COARSE, *NOISE):
+        for noise in NOISE:
             for _ in range(_STEPS):
                 curvature, slope = self._normal(at, free, noise)
                 curvature = curvature + np.diag(SPREADS**-2)
                 slope = np.where(free, slope + at * SPREADS**-2, 0.0)
-                curvature = np.where(held, np.eye(5), curvature)
+                curvature = np.where(held, np.eye(6), curvature)
                 step = -np.linalg.solve(curvature, slope[..., None])[..., 0]
                 step /= np.maximum(1.0, np.max(np.abs(step) / _FURTHEST, axis=1, keepdims=True))
                 at = at + step
                 if np.max(np.abs(step) / _SMALL) < 1:
                     break
-            if noise in NOISE:
-                likely = self._likelihood(self._off(at), noise) - stray(at)
-                better = likely > reached
-                best[better], reached[better] = at[better], likely[better]
+            likely = self._likelihood(self._off(at), noise) - stray(at)
+            better = likely > reached
+            best[better], reached[better] = at[better], likely[better]
         return best, reached
 
     def _off(self, numbers: Numbers) -> NDArray[np.float64]:
@@ -131,10 +129,11 @@ class Lines:
         middle = self.ends.mean(axis=1)
         along = self.ends[:, 1] - self.ends[:, 0]
         middle = origin + numbers[:, None, 1:3] + np.exp(numbers[:, :1, None]) * (middle - origin)
+        focal = 128 / np.tan(np.radians(0.5 * camera.fov_degrees * np.exp(numbers[:, 5])))[:, None, None]
         # From a line's middle towards an axis' vanishing point, wherever that is, at infinity too: [m, n, axis].
         across, down, forward = (rotations[:, None, i, :] for i in range(3))
-        towards_x = camera.focal * across - (middle[..., :1] - 128) * forward
-        towards_y = camera.focal * down - (middle[..., 1:] - 128) * forward
+        towards_x = focal * across - (middle[..., :1] - 128) * forward
+        towards_y = focal * down - (middle[..., 1:] - 128) * forward
         along_x, along_y = along[:, :1], along[:, 1:]
         angle = np.arctan2(along_x * towards_y - along_y * towards_x, along_x * towards_x + along_y * towards_y)
         return np.asarray((angle + math.pi / 2) % math.pi - math.pi / 2)
@@ -162,19 +161,19 @@ class Lines:
     def _normal(
         self, numbers: Numbers, free: NDArray[np.bool_], noise: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Curvature [m, 5, 5] and slope [m, 5] of half the squared errors, each line's three axes weighed.
+        """Curvature [m, 6, 6] and slope [m, 6] of half the squared errors, each line's three axes weighed.
 
         After Gauss and Newton: errors are taken to change in proportion to the numbers; those not free have none.
         """
         which, number = np.nonzero(free)
-        changes = np.zeros((len(which), 5))
+        changes = np.zeros((len(which), 6))
         changes[np.arange(len(which)), number] = _SMALL[number]
         all_off = self._off(np.concatenate([numbers, numbers[which] + changes]))
         off, changed = all_off[: len(numbers)], all_off[len(numbers) :]
         densities = self._densities(off, noise)
         total = 1 + sum((values for values, _ in densities), np.zeros(())).sum(axis=2, keepdims=True)
         weights = sum((values / deviation**2 for values, deviation in densities), np.zeros(())) / total
-        slopes = np.zeros((len(numbers), 5, off[0].size))
+        slopes = np.zeros((len(numbers), 6, off[0].size))
         differences = (changed - off[which] + math.pi / 2) % math.pi - math.pi / 2
         slopes[which, number] = (differences / _SMALL[number, None, None]).reshape(len(which), -1)
         weighted = slopes * weights.reshape(len(numbers), 1, -1)
@@ -182,7 +181,7 @@ class Lines:
 
 
 def stray(numbers: Numbers) -> NDArray[np.float64]:
-    """How unlikely it is that drawings are so far out of place: float64 [m], the logarithm, for float64 [m, 5]."""
+    """How unlikely it is that drawings are so far out of place: float64 [m], the logarithm, for float64 [m, 6]."""
     return np.asarray(0.5 * ((numbers / SPREADS) ** 2).sum(axis=-1))
 
 

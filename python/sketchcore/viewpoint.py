@@ -105,7 +105,7 @@ def _ranked(model: Model, drawing: NDArray[np.uint8]) -> list[tuple[str, float]]
     cameras = [VIEWPOINTS[name] for name in QUARTER_VIEWS]
     volumes = list(model.first_predictions(_seen_by(drawing, cameras)))
     fills = [outline_iou(volume, camera, drawing) for volume, camera in zip(volumes, cameras, strict=True)]
-    nowhere = np.zeros((1, 5))
+    nowhere = np.zeros((1, 6))
     lines = [float(Lines.of(drawing, camera).likelihood(nowhere)[0]) for camera in cameras]
     scores = [
         fill + _CONFIDENCE * expected_iou(volume) + _LINES * likely

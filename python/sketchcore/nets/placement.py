@@ -41,27 +41,30 @@ class Placement:
         scale: 1 for none.
         shift: pixels to the right and down.
         turn: degrees about the camera's right and down axes.
+        widening: its field of view is so many times as large (`Camera.widened`).
     """
 
     scale: float = 1.0
     shift: tuple[float, float] = (0.0, 0.0)
     turn: tuple[float, float] = (0.0, 0.0)
+    widening: float = 1.0
 
     @classmethod
     def from_numbers(cls, numbers: NDArray[np.float64]) -> Placement:
-        """The placement of five numbers, float64 [5] (see `numbers`)."""
-        scale, right, down, about_right, about_down = numbers.tolist()
-        return cls(math.exp(scale), (right, down), (about_right, about_down))
+        """The placement of six numbers, float64 [6] (see `numbers`)."""
+        scale, right, down, about_right, about_down, widening = numbers.tolist()
+        return cls(math.exp(scale), (right, down), (about_right, about_down), math.exp(widening))
 
     @property
     def numbers(self) -> NDArray[np.float64]:
-        """float64 [5]: the logarithm of the scale, the shift, and the turn."""
-        return np.array([math.log(self.scale), *self.shift, *self.turn])
+        """float64 [6]: the logarithm of the scale, the shift, the turn, and the logarithm of the widening."""
+        return np.array([math.log(self.scale), *self.shift, *self.turn, math.log(self.widening)])
 
     def of(self, sketches: Sketches) -> Sketches:
         """One drawing, taken so."""
         camera = Camera.from_packed(sketches.cameras[0])
-        turned = camera.turned(*self.turn).packed[None]
+        taken = camera.turned(*self.turn)
+        turned = (taken if self.widening == 1 else taken.widened(self.widening)).packed[None]
         if self.scale == 1 and self.shift == (0, 0):
             return sketches.seen_by(turned)
         return Sketches(self.move(sketches.drawings[0], camera)[None], turned)

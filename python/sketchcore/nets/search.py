@@ -27,16 +27,19 @@ Predict = Callable[[Sequence[Sketches]], Iterator[Volume]]
 _AMISS, _PART = 5.0, 0.5
 """A drawing is looked for that is so much likelier elsewhere (the logarithm): by its lines, and by this part of what
 the box and the outline of what is predicted could gain. Of exact drawings, that is one in seven."""
+_GAIN = 1.0
+"""How much likelier another place must be than the one where the drawing is."""
 _HOPELESS = 3.0
 """A search ends where all that lines speak for is so much less likely than where the drawing is."""
 _DOUBT = 0.0125
 """The likelihood of a place grows by e for so much more plausibility."""
 _LINES = 0.75
 """What the likelihood of lines counts for: they say some things twice."""
-_FAULT = 2.5
+_FAULT = 3.0
 """The logarithm of how much rarer drawings are with one fault more."""
-_SPREADS = np.array([0.08, 7.0, 7.0, 5.0, 5.0])
-"""How far from the likeliest place others are tried: the logarithm of the scale, pixels right and down, degrees."""
+_SPREADS = np.array([0.08, 7.0, 7.0, 5.0, 5.0, 0.06])
+"""How far from the likeliest place others are tried: the logarithm of the scale, pixels, degrees, and the logarithm of
+the field of view."""
 _SURE = 1 / 9
 """Lines say where a drawing belongs three times less surely than they would if each were right."""
 _DRAWS = 8
@@ -46,9 +49,9 @@ _USUAL = 138
 
 @dataclass(frozen=True)
 class _Way:
-    """A way in which a drawing may be out of place: which of the five numbers are off, and how many faults that is."""
+    """A way in which a drawing may be out of place: which of the six numbers are off, and how many faults that is."""
 
-    free: tuple[bool, bool, bool, bool, bool]
+    free: tuple[bool, bool, bool, bool, bool, bool]
     faults: int
 
     @property
@@ -57,13 +60,14 @@ class _Way:
 
 
 _Place = tuple[_Way, NDArray[np.float64]]
-_NONE = _Way((False, False, False, False, False), 0)
-_TURNED = _Way((False, False, False, True, True), 1)
-_SHIFTED = _Way((False, True, True, False, False), 1)
-_SCALED = _Way((True, False, False, False, False), 1)
-_PLACED = _Way((True, True, True, False, False), 2)
-_ALL = _Way((True, True, True, True, True), 3)
-_SINGLE = (_TURNED, _SHIFTED, _SCALED)
+_NONE = _Way((False, False, False, False, False, False), 0)
+_TURNED = _Way((False, False, False, True, True, False), 1)
+_SHIFTED = _Way((False, True, True, False, False, False), 1)
+_SCALED = _Way((True, False, False, False, False, False), 1)
+_WIDENED = _Way((False, False, False, False, False, True), 1)
+_PLACED = _Way((True, True, True, False, False, False), 2)
+_ALL = _Way((True, True, True, True, True, True), 4)
+_SINGLE = (_TURNED, _SHIFTED, _SCALED, _WIDENED)
 
 
 @dataclass(frozen=True)
@@ -108,8 +112,8 @@ def in_place(predict: Predict, sketches: Sketches, first: Volume, always: bool =
     moved = Sketches(np.concatenate([s.drawings for s in taken]), np.concatenate([s.cameras for s in taken]))
     if len(alone) > 1:
         [together] = predict([moved])
-        said = sum(_said(one, place.numbers) - _said(one, np.zeros(5)) for one, place in zip(lines, found, strict=True))
-        if not (plausibility(together, moved) - plausibility(first, sketches)) / _DOUBT + said > 0:
+        said = sum(_said(one, place.numbers) - _said(one, np.zeros(6)) for one, place in zip(lines, found, strict=True))
+        if not (plausibility(together, moved) - plausibility(first, sketches)) / _DOUBT + said > _GAIN:
             return sketches
     return moved
 
@@ -128,8 +132,8 @@ def _run_elsewhere(lines: Lines) -> float:
     """How much likelier the lines are if the drawing has one fault than if it has none, the logarithm."""
     if not len(lines):
         return 0.0
-    here = float(lines.likelihood(np.zeros((1, 5)))[0])
-    _, reached = lines.fit(np.zeros((len(_SINGLE), 5)), np.array([way.free for way in _SINGLE]))
+    here = float(lines.likelihood(np.zeros((1, 6)))[0])
+    _, reached = lines.fit(np.zeros((len(_SINGLE), 6)), np.array([way.free for way in _SINGLE]))
     return float(reached.max()) - here
 
 
@@ -139,7 +143,7 @@ class _Search:
     def __init__(self, predict: Predict, sketches: Sketches, lines: Lines, first: Volume) -> None:
         self.predict, self.sketches, self.lines = predict, sketches, lines
         self.camera = Camera.from_packed(sketches.cameras[0])
-        self.tried = [self._tried(_NONE, np.zeros(5), sketches, first)]
+        self.tried = [self._tried(_NONE, np.zeros(6), sketches, first)]
 
     def place(self) -> Placement:
         here = self.tried[0]
@@ -160,7 +164,7 @@ class _Search:
         # Single predictions judge their places with errors; the mean of many is surer.
         mean, best = self.tried[-1], self._best()
         taken = mean if mean.likelihood > best.likelihood - 1 else best
-        return Placement.from_numbers(taken.numbers) if taken.likelihood > here.likelihood else Placement()
+        return Placement.from_numbers(taken.numbers) if taken.likelihood > here.likelihood + _GAIN else Placement()
 
     def _tried(self, way: _Way, numbers: NDArray[np.float64], sketches: Sketches, volume: Volume) -> _Tried:
         plausible = plausibility(volume, sketches) / _DOUBT
@@ -183,11 +187,11 @@ class _Search:
         Lines are asked from where the drawing is, and from where it would fit roughly.
         """
         roughly = self._roughly()
-        shifted = np.array([0.0, *(roughly[1:3] / math.exp(roughly[0])), 0.0, 0.0])
-        places = [(_NONE, np.zeros(5)), (_SHIFTED, shifted)]
+        shifted = np.array([0.0, *(roughly[1:3] / math.exp(roughly[0])), 0.0, 0.0, 0.0])
+        places = [(_NONE, np.zeros(6)), (_SHIFTED, shifted)]
         if not len(self.lines):
             return places[1:], [(_PLACED, roughly)]
-        begun = [(way, np.zeros(5)) for way in (*_SINGLE, _PLACED, _ALL)]
+        begun = [(way, np.zeros(6)) for way in (*_SINGLE, _PLACED, _ALL)]
         begun += [(_SHIFTED, shifted), (_PLACED, roughly), (_ALL, roughly)]
         fits, _ = self.lines.fit(np.array([start for _, start in begun]), np.array([way.free for way, _ in begun]))
         for (way, _), numbers in zip(begun, fits, strict=True):
@@ -200,11 +204,11 @@ class _Search:
         """The ink in the middle, as large as drawings usually are."""
         rows, columns = np.nonzero(self.sketches.drawings[0] >= 64)
         if not len(rows):
-            return np.zeros(5)
+            return np.zeros(6)
         low, high = np.array([columns.min(), rows.min()]), np.array([columns.max(), rows.max()]) + 1
         scale = _USUAL / float((high - low).max())
         shift = scale * (seen_at(self.camera, np.zeros(3)) - 0.5 * (low + high))
-        return np.array([math.log(scale), *shift, 0.0, 0.0])
+        return np.array([math.log(scale), *shift, 0.0, 0.0, 0.0])
 
     def _suggested(self, one: _Tried) -> list[_Place]:
         """The place at which the box of what is predicted would be where it belongs."""
@@ -214,12 +218,12 @@ class _Search:
         middle, side = box
         scale = min(max(LARGEST / side, 0.5), 2.0)
         shift = scale * (one.numbers[1:3] + seen_at(self.camera, np.zeros(3)) - seen_at(self.camera, middle))
-        return [(_PLACED, np.array([one.numbers[0] + math.log(scale), *shift, 0.0, 0.0]))]
+        return [(_PLACED, np.array([one.numbers[0] + math.log(scale), *shift, 0.0, 0.0, 0.0]))]
 
     def _around(self, way: _Way, at: NDArray[np.float64], far: float) -> list[_Place]:
         """Places about another one as far as lines allow, always the same, in pairs on opposite sides of it."""
         index = way.index
-        told = _SURE * self.lines.information(at) if len(self.lines) else np.zeros((5, 5))
+        told = _SURE * self.lines.information(at) if len(self.lines) else np.zeros((6, 6))
         told = told[np.ix_(index, index)] + np.diag(_SPREADS[index] ** -2)
         spread = far * np.linalg.cholesky(np.linalg.inv(told))
         sides = np.random.default_rng(0).standard_normal((_DRAWS // 2, len(index)))
