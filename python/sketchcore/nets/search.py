@@ -24,9 +24,10 @@ from sketchcore.rounds import Volume
 Predict = Callable[[Sequence[Sketches]], Iterator[Volume]]
 """A network's first predictions, one for the drawings of each object."""
 
-_AMISS, _PART = 5.0, 0.5
+_AMISS, _AMISS_AMONG, _PART = 5.0, 7.0, 0.5
 """A drawing is looked for that is so much likelier elsewhere (the logarithm): by its lines, and by this part of what
-the box and the outline of what is predicted could gain. Of exact drawings, that is one in seven."""
+the box and the outline of what is predicted could gain. Of exact drawings, that is one in seven. Among
+several it takes more: together they leave less in doubt, and one that is out of place then stands out."""
 _GAIN = 1.0
 """How much likelier another place must be than the one where the drawing is."""
 _HOPELESS = 3.0
@@ -97,7 +98,8 @@ def in_place(predict: Predict, sketches: Sketches, first: Volume, always: bool =
     alone = [Sketches(sketches.drawings[i : i + 1], sketches.cameras[i : i + 1]) for i in range(len(sketches))]
     lines = [Lines.of(one.drawings[0], Camera.from_packed(one.cameras[0])) for one in alone]
     elsewhere = [_run_elsewhere(one) for one in lines]
-    amiss = [always or _amiss(gained, first, one) > 0 for gained, one in zip(elsewhere, alone, strict=True)]
+    bar = _AMISS if len(alone) == 1 else _AMISS_AMONG
+    amiss = [always or _amiss(gained, first, one) > bar for gained, one in zip(elsewhere, alone, strict=True)]
     if not any(amiss):
         return sketches
     looked_for = [one for one, off in zip(alone, amiss, strict=True) if off]
@@ -119,8 +121,8 @@ def in_place(predict: Predict, sketches: Sketches, first: Volume, always: bool =
 
 
 def _amiss(elsewhere: float, volume: Volume, sketches: Sketches) -> float:
-    """By how much drawings are too far out of place to be left where they are."""
-    return elsewhere + _PART * shortfall(volume, sketches) / _DOUBT - _AMISS
+    """How much likelier drawings may be elsewhere, by their lines and by what is predicted."""
+    return elsewhere + _PART * shortfall(volume, sketches) / _DOUBT
 
 
 def _said(lines: Lines, numbers: NDArray[np.float64]) -> float:
