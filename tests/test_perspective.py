@@ -102,10 +102,10 @@ def test_a_turned_camera_is_that_of_the_package() -> None:
         assert lines.likelihood(there) == pytest.approx(turned.likelihood(np.zeros((1, 6))))
 
 
-def test_a_wider_camera_is_told_and_sees_a_ball_as_large() -> None:
+def test_a_wider_camera_is_told_and_sees_the_origin_as_large() -> None:
     wide = CAMERA.widened(1.2)
     assert wide.fov_degrees == pytest.approx(54)
-    assert np.linalg.norm(wide.position) * math.sin(math.radians(27)) == pytest.approx(2 * math.sin(math.radians(22.5)))
+    assert np.linalg.norm(wide.position) * math.tan(math.radians(27)) == pytest.approx(2 * math.tan(math.radians(22.5)))
     lines = Lines.of(sk.draw(STAIRS, wide, style=FINE), CAMERA)
     [found], _ = lines.fit(np.zeros((1, 6)), np.array([[0, 0, 0, 0, 0, 1]], bool))
     assert math.exp(found[5]) == pytest.approx(1.2, abs=0.05)

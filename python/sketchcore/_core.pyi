@@ -46,9 +46,11 @@ __all__ = [
     "viewpoints",
     "voxelize",
     "voxelize_mesh",
+    "widened",
 ]
 
 def viewpoints() -> NDArray[np.float64]: ...
+def widened(camera: NDArray[np.float64], share: float) -> NDArray[np.float64]: ...
 def voxelize(shape: NDArray[np.float64], out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]: ...
 def voxelize_mesh(
     vertices: NDArray[np.float64], faces: NDArray[np.int64], out: NDArray[np.uint8] | None = None

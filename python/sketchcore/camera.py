@@ -135,24 +135,34 @@ class Camera:
             right: degrees of the turn about the camera's own axis to the right, and
             down: about that which points down, both at once.
         """
-        angle = math.radians(math.hypot(right, down))
-        if angle == 0:
+        if right == 0 and down == 0:
             return self
-        x, y, z = (right * self.rotation[0] + down * self.rotation[1]) / math.hypot(right, down)
-        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        turn = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+        [turn] = turns(self.rotation, np.array([right]), np.array([down]))
         return Camera(turn @ self.position, self.rotation @ turn.T, self.fov_degrees, self.near, self.far)
 
     def widened(self, factor: float) -> Camera:
-        """The camera with a field of view so many times as large, from where a ball around the origin looks as large.
+        """The camera with a field of view so many times as large, from where what lies at the origin looks as large.
 
         Its near and far planes keep their distance from the origin.
         """
-        fov = self.fov_degrees * factor
-        away = _half_sine(self.fov_degrees) / _half_sine(fov)
-        gone = (away - 1) * float(np.linalg.norm(self.position))
-        near = max(self.near + gone, self.near / 20)
-        return Camera(away * self.position, self.rotation, fov, near, max(self.far + gone, 2 * near))
+        return Camera.from_packed(_core.widened(self.packed, factor - 1))
+
+
+def turns(rotation: NDArray[np.float64], right: NDArray[np.float64], down: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Turns about a camera's right and down axes, both at once (`Camera.turned`): float64 [m, 3, 3], of the world.
+
+    Args:
+        rotation: float64 [3, 3], the camera's.
+        right: float64 [m], degrees about its right axis.
+        down: float64 [m], degrees about its down axis.
+    """
+    degrees = np.hypot(right, down)
+    about = (right[:, None] * rotation[0] + down[:, None] * rotation[1]) / np.maximum(degrees, 1e-12)[:, None]
+    x, y, z = about.T
+    none = np.zeros_like(x)
+    cross = np.stack([none, -z, y, z, none, -x, -y, x, none], axis=1).reshape(-1, 3, 3)
+    angle = np.radians(degrees)[:, None, None]
+    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
 
 
 def pack_cameras(cameras: Iterable[Camera]) -> NDArray[np.float64]:

@@ -15,13 +15,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sketchcore import _core
-from sketchcore.camera import Camera
+from sketchcore.camera import Camera, turns
 from sketchcore.drawing import INK
+from sketchcore.nets.placement import seen_at
 
 Numbers = NDArray[np.float64]
 
@@ -64,6 +66,19 @@ class Lines:
         """The lines in a drawing, uint8 [256, 256], ink 255 on 0."""
         pieces = _core.straight(drawing, INK)
         return cls(pieces[:, :4].reshape(-1, 2, 2), pieces[:, 4], camera)
+
+    def seen_by(self, camera: Camera) -> Lines:
+        """The same lines, made by another camera."""
+        return Lines(self.ends, self.bend, camera)
+
+    @cached_property
+    def _length(self) -> NDArray[np.float64]:
+        return np.asarray(np.hypot(*(self.ends[:, 1] - self.ends[:, 0]).T))
+
+    @cached_property
+    def _strays(self) -> NDArray[np.float64]:
+        """The share of lines as long as each that run along no axis."""
+        return np.where(self._length < _SHORT, _STRAY_IF_SHORT, _STRAY)
 
     def __len__(self) -> int:
         return len(self.ends)
@@ -123,9 +138,8 @@ class Lines:
     def _off(self, numbers: Numbers) -> NDArray[np.float64]:
         """Radians between each line and the directions to the three vanishing points: float64 [m, n, 3]."""
         camera = self.camera
-        rotations = _turned(camera.rotation, numbers[:, 3], numbers[:, 4])
-        x, y, z = camera.rotation @ -camera.position
-        origin = 128 + camera.focal * np.array([x / z, y / z])
+        rotations = camera.rotation @ turns(camera.rotation, numbers[:, 3], numbers[:, 4]).transpose(0, 2, 1)
+        origin = seen_at(camera, np.zeros(3))
         middle = self.ends.mean(axis=1)
         along = self.ends[:, 1] - self.ends[:, 0]
         middle = origin + numbers[:, None, 1:3] + np.exp(numbers[:, :1, None]) * (middle - origin)
@@ -143,9 +157,8 @@ class Lines:
 
         float64 [m, n, 3], by the density of a line that runs anywhere; and float64 [n, 1], radians.
         """
-        length = np.hypot(*(self.ends[:, 1] - self.ends[:, 0]).T)
-        strays = np.where(length < _SHORT, _STRAY_IF_SHORT, _STRAY)[:, None]
-        close = (_ALLOWED * np.hypot(noise, np.maximum(self.bend - _STRAIGHT, 0)) / length)[:, None]
+        strays = self._strays[:, None]
+        close = (_ALLOWED * np.hypot(noise, np.maximum(self.bend - _STRAIGHT, 0)) / self._length)[:, None]
         found = []
         for share, deviation in ((1 - _LOOSE, close), (_LOOSE, _WIDER * close)):
             normal = np.exp(-0.5 * (off / deviation) ** 2) * (math.sqrt(math.pi / 2) / deviation)
@@ -153,10 +166,8 @@ class Lines:
         return found
 
     def _likelihood(self, off: NDArray[np.float64], noise: float) -> NDArray[np.float64]:
-        length = np.hypot(*(self.ends[:, 1] - self.ends[:, 0]).T)
-        strays = np.where(length < _SHORT, _STRAY_IF_SHORT, _STRAY)
         density = sum((values for values, _ in self._densities(off, noise)), np.zeros(()))
-        return np.asarray(np.log(strays * (1 + density.sum(axis=2))).sum(axis=1))
+        return np.asarray(np.log(self._strays * (1 + density.sum(axis=2))).sum(axis=1))
 
     def _normal(
         self, numbers: Numbers, free: NDArray[np.bool_], noise: float
@@ -183,15 +194,3 @@ class Lines:
 def stray(numbers: Numbers) -> NDArray[np.float64]:
     """How unlikely it is that drawings are so far out of place: float64 [m], the logarithm, for float64 [m, 6]."""
     return np.asarray(0.5 * ((numbers / SPREADS) ** 2).sum(axis=-1))
-
-
-def _turned(rotation: NDArray[np.float64], right: Numbers, down: Numbers) -> NDArray[np.float64]:
-    """A camera's axes, turned as `Camera.turned` does, about many: float64 [m, 3, 3]."""
-    degrees = np.hypot(right, down)
-    about = (right[:, None] * rotation[0] + down[:, None] * rotation[1]) / np.maximum(degrees, 1e-12)[:, None]
-    x, y, z = about.T
-    none = np.zeros_like(x)
-    cross = np.stack([none, -z, y, z, none, -x, -y, x, none], axis=1).reshape(-1, 3, 3)
-    angle = np.radians(degrees)[:, None, None]
-    turn = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
-    return np.asarray(rotation @ turn.transpose(0, 2, 1))

@@ -106,10 +106,10 @@ def _ranked(model: Model, drawing: NDArray[np.uint8]) -> list[tuple[str, float]]
     volumes = list(model.first_predictions(_seen_by(drawing, cameras)))
     fills = [outline_iou(volume, camera, drawing) for volume, camera in zip(volumes, cameras, strict=True)]
     nowhere = np.zeros((1, 6))
-    lines = [float(Lines.of(drawing, camera).likelihood(nowhere)[0]) for camera in cameras]
+    lines = Lines.of(drawing, cameras[0])
     scores = [
-        fill + _CONFIDENCE * expected_iou(volume) + _LINES * likely
-        for fill, volume, likely in zip(fills, volumes, lines, strict=True)
+        fill + _CONFIDENCE * expected_iou(volume) + _LINES * float(lines.seen_by(camera).likelihood(nowhere)[0])
+        for fill, volume, camera in zip(fills, volumes, cameras, strict=True)
     ]
     best_first = sorted(range(len(cameras)), key=lambda i: -scores[i])
     return [(QUARTER_VIEWS[i], fills[i]) for i in best_first]

@@ -61,7 +61,7 @@ mod _core {
         check_style, draw_kinds, hidden_lines, random_style, redraw, straight, style_camera, trace,
     };
     #[pymodule_export]
-    use super::views::{buffers, draw, frustum, isosurface, lines, viewpoints};
+    use super::views::{buffers, draw, frustum, isosurface, lines, viewpoints, widened};
     #[pymodule_export]
     use super::volumes::{bilateral, to_camera_grid, to_world_grid, voxelize};
 }

@@ -7,7 +7,8 @@ use crate::error::all_finite;
 use crate::lines::{LineConfig, detect};
 use crate::voxel::{CELLS, SIDE};
 use numpy::{
-    IntoPyArray, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
+    PyUntypedArrayMethods,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -18,6 +19,16 @@ pub fn viewpoints<'py>(py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let orbit = |&(azimuth, elevation): &(f64, f64)| Camera::orbit(azimuth, elevation, 0.0, DISTANCE);
     let rows: Vec<f64> = VIEWPOINTS.iter().flat_map(|v| orbit(v).to_packed()).collect();
     rows.into_pyarray(py).reshape([VIEWPOINTS.len(), PACKED])
+}
+
+/// The camera with a field of view larger by a share, from where what lies at the origin looks as large; float64 [15].
+#[pyfunction]
+pub fn widened<'py>(
+    py: Python<'py>,
+    camera: PyReadonlyArrayDyn<'py, f64>,
+    share: f64,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    Ok(camera_of(&camera)?.widened(share).to_packed().to_vec().into_pyarray(py))
 }
 
 #[pyfunction]
