@@ -223,6 +223,13 @@ def test_strokes_are_where_the_slow_twin_has_them() -> None:
         assert 0.85 < lengths[0] / lengths[1] < 1.02
 
 
+def test_no_line_is_lost_when_drawn_again() -> None:
+    batch = sk.generate(99, 400, views=1)
+    for shape, (camera,) in zip(batch.shapes, batch.cameras, strict=True):
+        clean, again = sk.draw(shape, camera), sk.draw(shape, camera, style=PEN)
+        assert np.mean(_distance(again)[clean > 0] <= 2.5) > 0.98
+
+
 def test_a_pen_leaves_ink_as_far_as_it_is_wide() -> None:
     rows, cols = np.mgrid[:256, :256].astype(np.float32)
     for width, shape in zip((0.5, 1.0, 2.6), SHAPES, strict=False):

@@ -198,7 +198,8 @@ fn corners(pixels: &[[i32; 2]], closed: bool) -> Vec<usize> {
     found.into_iter().map(|(i, _)| i).collect()
 }
 
-/// A point every so many pixels: on the straight line between the ends where all pixels are near it, else averaged.
+/// A point every so many pixels: on the straight line between the ends where all pixels are near it, else averaged. A
+/// line that ends where it begins goes along none.
 fn smoothed(pixels: &[[i32; 2]], step: usize, closed: bool) -> Vec<Point> {
     let last = pixels.len() - 1;
     let to_point = |[x, y]: [i32; 2]| [x as f32, y as f32];
@@ -208,7 +209,7 @@ fn smoothed(pixels: &[[i32; 2]], step: usize, closed: bool) -> Vec<Point> {
     let count = last.div_ceil(step).max(1);
     let strays =
         |p: &[i32; 2]| ((p[0] as f32 - a[0]) * dy - (p[1] as f32 - a[1]) * dx).abs() > STRAIGHT * long;
-    if !closed && !pixels.iter().any(strays) {
+    if long > 0.0 && !pixels.iter().any(strays) {
         let at = |k: usize| k as f32 / count as f32;
         return (0..=count).map(|k| [a[0] + at(k) * dx, a[1] + at(k) * dy]).collect();
     }

@@ -38,6 +38,29 @@ fn a_thick_disc_ring_is_one_closed_line() {
 }
 
 #[test]
+fn a_drop_with_one_corner_is_a_line_all_around() {
+    // A ring, and above it two lines that meet in a point, where they leave it.
+    let (half, high) = (42.0 / 2f64.sqrt(), 42.0 * 2f64.sqrt());
+    let ring = |x: f64, y: f64| {
+        let d = x.hypot(y);
+        (41.0..43.0).contains(&d) && y > -half
+    };
+    let sides = |x: f64, y: f64| y <= -half && (y + high - x.abs()).abs() < 1.0;
+    let drop = with_ink(|x, y| {
+        let (x, y) = (f64::from(x - 128), f64::from(y - 120));
+        ring(x, y) || sides(x, y)
+    });
+    for through in [false, true] {
+        let strokes = trace(&drop, 64, TraceConfig { step: 2, through });
+        let [stroke] = &strokes[..] else { panic!("{} strokes", strokes.len()) };
+        let [x, y] = stroke.points[0];
+        assert!(!stroke.closed && (x - 128.0).abs() < 2.0 && (y - (120.0 - high as f32)).abs() < 2.5);
+        let lowest = stroke.points.iter().map(|p| p[1]).fold(0.0, f32::max);
+        assert!((lowest - 162.0).abs() < 2.0, "{lowest}");
+    }
+}
+
+#[test]
 fn lines_go_on_through_crossings_if_asked() {
     let cross = with_ink(|x, y| (y == 128 && (50..200).contains(&x)) || (x == 120 && (40..220).contains(&y)));
     assert_eq!(trace(&cross, 64, FINE).len(), 4);
