@@ -97,7 +97,7 @@ def test_where_a_drawing_belongs_is_told_to_a_few_pixels(scale: float, shift: tu
 def test_a_turned_camera_is_that_of_the_package() -> None:
     lines = Lines.of(drawn(), CAMERA)
     for right, down in ((7.0, -3.0), (0.0, 20.0)):
-        turned = Lines(lines.ends, lines.bend, CAMERA.turned(right, down))
+        turned = lines.seen_by(CAMERA.turned(right, down))
         there = np.array([[0, 0, 0, right, down, 0]])
         assert lines.likelihood(there) == pytest.approx(turned.likelihood(np.zeros((1, 6))))
 
@@ -109,7 +109,7 @@ def test_a_wider_camera_is_told_and_sees_the_origin_as_large() -> None:
     lines = Lines.of(sk.draw(STAIRS, wide, style=FINE), CAMERA)
     [found], _ = lines.fit(np.zeros((1, 6)), np.array([[0, 0, 0, 0, 0, 1]], bool))
     assert math.exp(found[5]) == pytest.approx(1.2, abs=0.05)
-    there = Lines(lines.ends, lines.bend, wide).likelihood(np.zeros((1, 6)))
+    there = lines.seen_by(wide).likelihood(np.zeros((1, 6)))
     assert lines.likelihood(np.array([[0, 0, 0, 0, 0, math.log(1.2)]])) == pytest.approx(there)
 
 

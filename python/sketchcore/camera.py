@@ -152,12 +152,14 @@ def turns(rotation: NDArray[np.float64], right: NDArray[np.float64], down: NDArr
     """Turns about a camera's right and down axes, both at once (`Camera.turned`): float64 [m, 3, 3], of the world.
 
     Args:
-        rotation: float64 [3, 3], the camera's.
+        rotation: float64 [3, 3], the camera's, or [m, 3, 3] for one each.
         right: float64 [m], degrees about its right axis.
         down: float64 [m], degrees about its down axis.
     """
     degrees = np.hypot(right, down)
-    about = (right[:, None] * rotation[0] + down[:, None] * rotation[1]) / np.maximum(degrees, 1e-12)[:, None]
+    about = (right[:, None] * rotation[..., 0, :] + down[:, None] * rotation[..., 1, :]) / np.maximum(degrees, 1e-12)[
+        :, None
+    ]
     x, y, z = about.T
     none = np.zeros_like(x)
     cross = np.stack([none, -z, y, z, none, -x, -y, x, none], axis=1).reshape(-1, 3, 3)

@@ -40,6 +40,8 @@ _LOOSE, _WIDER = 0.3, 4.0
 """This share of the lines misses by so many times more."""
 _STRAY, _STRAY_IF_SHORT, _SHORT = 0.25, 0.6, 16.0
 """The share of lines that run along no axis, and that of those shorter than so many pixels."""
+_LEVEL = np.diag([1.0, -1.0, -1.0])
+"""The axes of a camera that stands upright and looks along -z."""
 _STEPS = 6
 _SMALL = np.array([1e-3, 0.1, 0.1, 0.05, 0.05, 1e-3])
 """Changes that derivatives are taken by; a fit ends when it moves by less."""
@@ -49,27 +51,39 @@ _FURTHEST = np.array([0.15, 12.0, 12.0, 6.0, 6.0, 0.15])
 
 @dataclass(frozen=True)
 class Lines:
-    """The straight lines of a drawing, and the camera that it is said to be made by.
+    """The straight lines of a drawing, and the camera that it is said to be made by, or several.
 
     Attributes:
         ends: float64 [n, 2, 2], pixels to the right and down.
         bend: float64 [n], pixels by which each seems to bend.
-        camera: the camera.
+        cameras: the camera; or m of them, one for each of the m ways to take the drawing that are asked about.
+        upright: whether cameras that stand upright stay so: they are turned about the world's vertical axis instead of
+            their own down axis, after they were turned about their right one.
     """
 
     ends: NDArray[np.float64]
     bend: NDArray[np.float64]
-    camera: Camera
+    cameras: tuple[Camera, ...]
+    upright: bool = False
 
     @classmethod
     def of(cls, drawing: NDArray[np.uint8], camera: Camera) -> Lines:
         """The lines in a drawing, uint8 [256, 256], ink 255 on 0."""
         pieces = _core.straight(drawing, INK)
-        return cls(pieces[:, :4].reshape(-1, 2, 2), pieces[:, 4], camera)
+        return cls(pieces[:, :4].reshape(-1, 2, 2), pieces[:, 4], (camera,))
 
-    def seen_by(self, camera: Camera) -> Lines:
-        """The same lines, made by another camera."""
-        return Lines(self.ends, self.bend, camera)
+    def seen_by(self, *cameras: Camera, upright: bool = False) -> Lines:
+        """The same lines, made by other cameras."""
+        return Lines(self.ends, self.bend, cameras, upright)
+
+    @cached_property
+    def _bases(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Of each camera the rotation, where it sees the origin, and the field of view: [k, 3, 3], [k, 2], [k]."""
+        return (
+            np.stack([camera.rotation for camera in self.cameras]),
+            np.stack([seen_at(camera, np.zeros(3)) for camera in self.cameras]),
+            np.array([camera.fov_degrees for camera in self.cameras]),
+        )
 
     @cached_property
     def _length(self) -> NDArray[np.float64]:
@@ -135,15 +149,22 @@ class Lines:
             best[better], reached[better] = at[better], likely[better]
         return best, reached
 
-    def _off(self, numbers: Numbers) -> NDArray[np.float64]:
-        """Radians between each line and the directions to the three vanishing points: float64 [m, n, 3]."""
-        camera = self.camera
-        rotations = camera.rotation @ turns(camera.rotation, numbers[:, 3], numbers[:, 4]).transpose(0, 2, 1)
-        origin = seen_at(camera, np.zeros(3))
+    def _off(self, numbers: Numbers, which: NDArray[np.intp] | None = None) -> NDArray[np.float64]:
+        """Radians between each line and the directions to the three vanishing points: float64 [m, n, 3].
+
+        Args:
+            numbers: float64 [m, 6].
+            which: intp [m], the camera of each, if there are several; None for theirs in order.
+        """
+        rotation, origin, fov = self._bases
+        if len(self.cameras) > 1 and which is not None:
+            rotation, origin, fov = rotation[which], origin[which], fov[which]
+        origin = origin[:, None]
+        rotations = rotation @ self._turns(rotation, numbers[:, 3:5]).transpose(0, 2, 1)
         middle = self.ends.mean(axis=1)
         along = self.ends[:, 1] - self.ends[:, 0]
         middle = origin + numbers[:, None, 1:3] + np.exp(numbers[:, :1, None]) * (middle - origin)
-        focal = 128 / np.tan(np.radians(0.5 * camera.fov_degrees * np.exp(numbers[:, 5])))[:, None, None]
+        focal = 128 / np.tan(np.radians(0.5 * fov * np.exp(numbers[:, 5])))[:, None, None]
         # From a line's middle towards an axis' vanishing point, wherever that is, at infinity too: [m, n, axis].
         across, down, forward = (rotations[:, None, i, :] for i in range(3))
         towards_x = focal * across - (middle[..., :1] - 128) * forward
@@ -151,6 +172,13 @@ class Lines:
         along_x, along_y = along[:, :1], along[:, 1:]
         angle = np.arctan2(along_x * towards_y - along_y * towards_x, along_x * towards_x + along_y * towards_y)
         return np.asarray((angle + math.pi / 2) % math.pi - math.pi / 2)
+
+    def _turns(self, rotation: NDArray[np.float64], degrees: Numbers) -> NDArray[np.float64]:
+        right, down = degrees.T
+        if not self.upright:
+            return turns(rotation, right, down)
+        none = np.zeros_like(down)
+        return turns(_LEVEL, none, down) @ turns(rotation, right, none)
 
     def _densities(self, off: NDArray[np.float64], noise: float) -> list[tuple[NDArray[np.float64], Numbers]]:
         """For lines that keep close to their axis and for loose ones: densities, and standard deviations.
@@ -179,7 +207,8 @@ class Lines:
         which, number = np.nonzero(free)
         changes = np.zeros((len(which), 6))
         changes[np.arange(len(which)), number] = _SMALL[number]
-        all_off = self._off(np.concatenate([numbers, numbers[which] + changes]))
+        order = np.concatenate([np.arange(len(numbers)), which])
+        all_off = self._off(np.concatenate([numbers, numbers[which] + changes]), order)
         off, changed = all_off[: len(numbers)], all_off[len(numbers) :]
         densities = self._densities(off, noise)
         total = 1 + sum((values for values, _ in densities), np.zeros(())).sum(axis=2, keepdims=True)

@@ -2,22 +2,19 @@
 
 A viewpoint is as plausible as the solid that is predicted from it fills the drawing's outline when seen from it (the
 prediction as it is, for once outlines are heeded every solid fills them), as the prediction is sure of itself, and as
-the drawing's straight lines run along the axes that it sees (`perspective.py`). Cameras that stand elsewhere are
-compared by the place and size of the solid as well (`nets/placement.py`), and by how much of the ink, straight or not,
-runs along their axes (`directions.py`).
+the drawing's straight lines run along the axes that it sees (`perspective.py`). Cameras that stand elsewhere are those
+that lines speak for (`calibration.py`); the place of the solid helps to choose among them (`nets/placement.py`).
 """
 
 from __future__ import annotations
 
-import itertools
-import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sketchcore.calibration import CARRIED, cameras_spoken_for, likelihoods
 from sketchcore.camera import QUARTER_VIEWS, VIEWPOINTS, Camera, pack_cameras
-from sketchcore.directions import Directions
 from sketchcore.nets.model import Model
 from sketchcore.nets.placement import CAMERA, expected_iou, plausibility
 from sketchcore.nets.sketches import Sketches
@@ -28,19 +25,12 @@ _CONFIDENCE, _LINES = 0.25, 0.01
 """What a prediction's confidence counts for beside the outline that it fills, and lines' likelihood (its logarithm)."""
 _POOR = 0.86
 """A viewpoint from which less of the outline is filled may not be where the drawing was made from."""
-_CLEARER = 0.12
-"""Nor may one when so much more ink runs along the axes of another camera: so it is in one of twenty exact drawings."""
-_WEIGHT = 0.25
-"""What such a share of the ink counts for beside a prediction's plausibility."""
+_LIKELIER = 5.0
+"""Nor may one when lines are so much likelier (the logarithm) from another camera than from any near it."""
+_LINES_ANYWHERE = 0.006
+"""What lines' likelihood counts for beside a prediction's plausibility, from cameras all around."""
 _GAIN = 0.03
 """How much better both together must be for another camera."""
-_STEP = 15
-_ELEVATIONS = (4.0, 14.0, 22.0, 30.0, 38.0)
-_FIELDS_OF_VIEW = (28.0, 45.0)
-_FACE_ON = 90
-"""Nobody chooses to see one side alone, whose edges hide those behind: cameras at multiples of this are left out."""
-_TRIED = 40
-"""Of these cameras, as many are tried as lines speak for most."""
 
 
 def guess_viewpoint(model: Model, drawing: NDArray[np.uint8]) -> list[str]:
@@ -65,28 +55,23 @@ def guess_camera(model: Model, drawing: NDArray[np.uint8]) -> tuple[str, Camera]
         drawing: uint8 [256, 256], ink 255 on 0.
     """
     name, fill = _ranked(model, drawing)[0]
-    directions = Directions.of(drawing)
-    position = VIEWPOINTS[name].position
-    first = round(math.degrees(math.atan2(position[2], position[0])) / _STEP) * _STEP - 90
-    azimuths = [azimuth for azimuth in range(first, first + 180, _STEP) if azimuth % _FACE_ON]
-    family = [
-        Camera.orbit(azimuth, elevation, fov_degrees=fov)
-        for azimuth, elevation, fov in itertools.product(azimuths, _ELEVATIONS, _FIELDS_OF_VIEW)
-    ]
-    agreed, agreements = directions.agreement(VIEWPOINTS[name]), [directions.agreement(one) for one in family]
-    if fill >= _POOR and max(agreements) <= agreed + _CLEARER:
-        return name, VIEWPOINTS[name]
-    tried = sorted(range(len(family)), key=lambda i: -agreements[i])[:_TRIED]
-    cameras = [VIEWPOINTS[name], *(family[i] for i in tried)]
-    agreed_by = [agreed, *(agreements[i] for i in tried)]
+    viewpoint = VIEWPOINTS[name]
+    lines = Lines.of(drawing, viewpoint)
+    _, [near] = lines.fit(np.zeros((1, 6)), np.array([CARRIED]))
+    found, likeliest = cameras_spoken_for(lines)
+    if fill >= _POOR and likeliest <= near + _LIKELIER:
+        return name, viewpoint
+    cameras = [viewpoint, *found]
     sketches = _seen_by(drawing, cameras)
     scores = [
-        plausibility(volume, seen, CAMERA) + _WEIGHT * share
-        for volume, seen, share in zip(model.first_predictions(sketches), sketches, agreed_by, strict=True)
+        plausibility(volume, seen, CAMERA) + _LINES_ANYWHERE * likely
+        for volume, seen, likely in zip(
+            model.first_predictions(sketches), sketches, likelihoods(lines, cameras), strict=True
+        )
     ]
     best = max(range(len(cameras)), key=lambda i: scores[i])
     if scores[best] <= scores[0] + _GAIN:
-        return name, VIEWPOINTS[name]
+        return name, viewpoint
     return _nearest(cameras[best]), cameras[best]
 
 
@@ -105,11 +90,10 @@ def _ranked(model: Model, drawing: NDArray[np.uint8]) -> list[tuple[str, float]]
     cameras = [VIEWPOINTS[name] for name in QUARTER_VIEWS]
     volumes = list(model.first_predictions(_seen_by(drawing, cameras)))
     fills = [outline_iou(volume, camera, drawing) for volume, camera in zip(volumes, cameras, strict=True)]
-    nowhere = np.zeros((1, 6))
-    lines = Lines.of(drawing, cameras[0])
+    likely = likelihoods(Lines.of(drawing, cameras[0]), cameras)
     scores = [
-        fill + _CONFIDENCE * expected_iou(volume) + _LINES * float(lines.seen_by(camera).likelihood(nowhere)[0])
-        for fill, volume, camera in zip(fills, volumes, cameras, strict=True)
+        fill + _CONFIDENCE * expected_iou(volume) + _LINES * lines
+        for fill, volume, lines in zip(fills, volumes, likely, strict=True)
     ]
     best_first = sorted(range(len(cameras)), key=lambda i: -scores[i])
     return [(QUARTER_VIEWS[i], fills[i]) for i in best_first]
