@@ -86,8 +86,16 @@ class Lines:
         )
 
     @cached_property
+    def _middles(self) -> NDArray[np.float64]:
+        return np.asarray(self.ends.mean(axis=1))
+
+    @cached_property
+    def _along(self) -> NDArray[np.float64]:
+        return np.asarray(self.ends[:, 1] - self.ends[:, 0])
+
+    @cached_property
     def _length(self) -> NDArray[np.float64]:
-        return np.asarray(np.hypot(*(self.ends[:, 1] - self.ends[:, 0]).T))
+        return np.asarray(np.hypot(*self._along.T))
 
     @cached_property
     def _strays(self) -> NDArray[np.float64]:
@@ -161,8 +169,7 @@ class Lines:
             rotation, origin, fov = rotation[which], origin[which], fov[which]
         origin = origin[:, None]
         rotations = rotation @ self._turns(rotation, numbers[:, 3:5]).transpose(0, 2, 1)
-        middle = self.ends.mean(axis=1)
-        along = self.ends[:, 1] - self.ends[:, 0]
+        middle, along = self._middles, self._along
         middle = origin + numbers[:, None, 1:3] + np.exp(numbers[:, :1, None]) * (middle - origin)
         focal = 128 / np.tan(np.radians(0.5 * fov * np.exp(numbers[:, 5])))[:, None, None]
         # From a line's middle towards an axis' vanishing point, wherever that is, at infinity too: [m, n, axis].
@@ -170,8 +177,8 @@ class Lines:
         towards_x = focal * across - (middle[..., :1] - 128) * forward
         towards_y = focal * down - (middle[..., 1:] - 128) * forward
         along_x, along_y = along[:, :1], along[:, 1:]
-        angle = np.arctan2(along_x * towards_y - along_y * towards_x, along_x * towards_x + along_y * towards_y)
-        return np.asarray((angle + math.pi / 2) % math.pi - math.pi / 2)
+        beside, ahead = along_x * towards_y - along_y * towards_x, along_x * towards_x + along_y * towards_y
+        return np.asarray(np.arctan(beside / np.where(ahead == 0, 1e-300, ahead)))
 
     def _turns(self, rotation: NDArray[np.float64], degrees: Numbers) -> NDArray[np.float64]:
         right, down = degrees.T
