@@ -17,24 +17,27 @@ def placed(vertices, faces):
 def mesh_crossings(corners, axis):
     """Faces below each voxel along an axis: those entered minus those left, and all of them; int [64, 64, 64] each.
 
-    Rays pass beside the voxels' centres, by a hair along the next axis and by a hair of that along the one after it.
+    In whole numbers, 2^20 to a voxel's side, so that it is exact on which side of an edge a ray passes; one that meets
+    an edge passes a hair along the next axis, and by a hair of that along the one after it.
     """
     across = [(axis + 1) % 3, (axis + 2) % 3]
-    at = (np.arange(SIDE) + 0.5) / SIDE - 0.5
-    rays = np.stack(np.meshgrid(at + 1e-7, at + 1e-11, indexing="ij"), axis=-1)
+    at = (2 * np.arange(SIDE) + 1) * 2**19
+    rays = np.stack(np.meshgrid(at, at, indexing="ij"), axis=-1)
     counts = np.zeros((2, SIDE, SIDE, SIDE + 1), int)
-    for face in corners:
+    for face in np.rint((corners + 0.5) * SIDE * 2**20).astype(np.int64):
         flat = face[:, across]
-        box = tuple(
-            slice(*np.searchsorted(at, ends)) for ends in zip(flat.min(0) - 1e-7, flat.max(0) + 1e-7, strict=True)
-        )
-        (ax, ay), (bx, by), (cx, cy) = np.moveaxis(flat[:, None, None] - rays[box], -1, 1)
-        shares = np.stack([bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx])
-        i, j = np.nonzero((shares > 0).all(axis=0) | (shares < 0).all(axis=0))
+        ends = zip(flat.min(0), flat.max(0), strict=True)
+        box = tuple(slice(np.searchsorted(at, low), np.searchsorted(at, high, "right")) for low, high in ends)
+        a, b, c = np.moveaxis(flat[:, None, None] - rays[box], -1, 1)
+        shares = np.stack([px * qy - py * qx for (px, py), (qx, qy) in ((b, c), (c, a), (a, b))])
+        hairs = np.stack([py - qy for (_, py), (_, qy) in ((b, c), (c, a), (a, b))])
+        hairs_of_hairs = np.stack([qx - px for (px, _), (qx, _) in ((b, c), (c, a), (a, b))])
+        signs = np.sign(np.where(shares != 0, shares, np.where(hairs != 0, hairs, hairs_of_hairs)))
+        i, j = np.nonzero(abs(signs.sum(axis=0)) == 3)
         shares = shares[:, i, j]
-        first = np.searchsorted(at, face[:, axis] @ shares / shares.sum(axis=0))
+        first = np.searchsorted(at, face[:, axis] @ shares.astype(float) / shares.sum(axis=0))
         where = (i + box[0].start, j + box[1].start, first)
-        np.add.at(counts[0], where, -np.sign(shares.sum(axis=0)).astype(int))
+        np.add.at(counts[0], where, -signs[0, i, j])
         np.add.at(counts[1], where, 1)
     return np.moveaxis(counts.cumsum(axis=-1)[..., :SIDE], (1, 2, 3), (across[0] + 1, across[1] + 1, axis + 1))
 
