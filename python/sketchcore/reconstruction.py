@@ -171,8 +171,8 @@ def reconstruct(
         drawings: one drawing or a sequence of them; a drawing is a path, a PIL image, or an array [H, W] or
             [H, W, 3 or 4], dark on light or light on dark.
         views: a viewpoint's name (`sketchcore.VIEWPOINTS`) or a `sketchcore.Camera` for each drawing; None, for a
-            single drawing only, guesses among the eight three-quarter views, and the cameras near the best of them
-            where its solid fills the outline poorly.
+            single drawing only, guesses among the eight three-quarter views, and the cameras that the drawing's lines
+            speak for where they speak against these, or where the best of them fills the outline poorly.
         iterations: rounds over all drawings, 0 or more; fewer are run where the solid has settled.
         tolerance: what that means: they stop after a round that moved fewer voxels to the other side of 0.5 than
             this share of those that are occupied; the first round, which moves most, may move 3.5 times as many

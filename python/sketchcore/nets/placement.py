@@ -29,7 +29,7 @@ PLACE = (0.42, 0.79, 0.83, 0.08)
 """What counts beside confidence: how well the outline is filled, the logarithm of the size, and the distance of the
 box's middle from the origin along x and y. Fitted to choose among places that lines speak for (docs/training.md)."""
 CAMERA = (0.5, 0.0, 0.35, 0.5)
-"""The same to choose among cameras all around, without a look at lines."""
+"""The same to choose among cameras all around, whose likelihood by lines is added (`viewpoint.py`)."""
 
 
 @dataclass(frozen=True)
