@@ -42,8 +42,7 @@ def cameras_spoken_for(lines: Lines) -> tuple[list[Camera], float]:
         40 cameras, each before the one a quarter turn on; and the likelihood of the lines (its natural logarithm, as
         `Lines.likelihood` has it) from the likeliest.
     """
-    x, _, z = lines.cameras[0].position
-    first = round(math.degrees(math.atan2(z, x)) / _STEP) * _STEP - 90
+    first = round(_azimuth(lines.cameras[0]) / _STEP) * _STEP - 90
     azimuths = [azimuth for azimuth in range(first, first + 90, _STEP) if not _face_on(azimuth)]
     around = [
         Camera.orbit(azimuth, elevation, fov_degrees=fov)

@@ -157,10 +157,8 @@ def turns(rotation: NDArray[np.float64], right: NDArray[np.float64], down: NDArr
         down: float64 [m], degrees about its down axis.
     """
     degrees = np.hypot(right, down)
-    about = (right[:, None] * rotation[..., 0, :] + down[:, None] * rotation[..., 1, :]) / np.maximum(degrees, 1e-12)[
-        :, None
-    ]
-    x, y, z = about.T
+    about = right[:, None] * rotation[..., 0, :] + down[:, None] * rotation[..., 1, :]
+    x, y, z = about.T / np.maximum(degrees, 1e-12)
     none = np.zeros_like(x)
     cross = np.stack([none, -z, y, z, none, -x, -y, x, none], axis=1).reshape(-1, 3, 3)
     angle = np.radians(degrees)[:, None, None]

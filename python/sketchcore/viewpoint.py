@@ -40,7 +40,7 @@ def guess_viewpoint(model: Model, drawing: NDArray[np.uint8]) -> list[str]:
         model: the network.
         drawing: uint8 [256, 256], ink 255 on 0.
     """
-    return [name for name, _ in _ranked(model, drawing)]
+    return [name for name, _ in _ranked(model, drawing, Lines.of(drawing, VIEWPOINTS[QUARTER_VIEWS[0]]))]
 
 
 def guess_camera(model: Model, drawing: NDArray[np.uint8]) -> tuple[str, Camera]:
@@ -54,9 +54,10 @@ def guess_camera(model: Model, drawing: NDArray[np.uint8]) -> tuple[str, Camera]
         model: the network.
         drawing: uint8 [256, 256], ink 255 on 0.
     """
-    name, fill = _ranked(model, drawing)[0]
+    looked = Lines.of(drawing, VIEWPOINTS[QUARTER_VIEWS[0]])
+    name, fill = _ranked(model, drawing, looked)[0]
     viewpoint = VIEWPOINTS[name]
-    lines = Lines.of(drawing, viewpoint)
+    lines = looked.seen_by(viewpoint)
     _, [near] = lines.fit(np.zeros((1, 6)), np.array([CARRIED]))
     found, likeliest = cameras_spoken_for(lines)
     if fill >= _POOR and likeliest <= near + _LIKELIER:
@@ -85,15 +86,14 @@ def opposite(name: str) -> str:
     return QUARTER_VIEWS[(QUARTER_VIEWS.index(name) + len(QUARTER_VIEWS) // 2) % len(QUARTER_VIEWS)]
 
 
-def _ranked(model: Model, drawing: NDArray[np.uint8]) -> list[tuple[str, float]]:
+def _ranked(model: Model, drawing: NDArray[np.uint8], lines: Lines) -> list[tuple[str, float]]:
     """The viewpoints, most plausible first, and how far from each the solid fills the outline."""
     cameras = [VIEWPOINTS[name] for name in QUARTER_VIEWS]
     volumes = list(model.first_predictions(_seen_by(drawing, cameras)))
     fills = [outline_iou(volume, camera, drawing) for volume, camera in zip(volumes, cameras, strict=True)]
-    likely = likelihoods(Lines.of(drawing, cameras[0]), cameras)
     scores = [
-        fill + _CONFIDENCE * expected_iou(volume) + _LINES * lines
-        for fill, volume, lines in zip(fills, volumes, likely, strict=True)
+        fill + _CONFIDENCE * expected_iou(volume) + _LINES * likely
+        for fill, volume, likely in zip(fills, volumes, likelihoods(lines, cameras), strict=True)
     ]
     best_first = sorted(range(len(cameras)), key=lambda i: -scores[i])
     return [(QUARTER_VIEWS[i], fills[i]) for i in best_first]
